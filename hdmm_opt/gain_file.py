@@ -1,0 +1,253 @@
+"""Gain files: building, writing and reading them."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from decimal import ROUND_CEILING, ROUND_HALF_EVEN, Context, Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stability import Composition, Gains, checker
+from trajectories import Reference, Spline
+
+from .control import gain_columns
+from .errors import InvalidInput
+from .problem import KINDS, Problem, resolved
+from .simulation import Scenario
+from .validation import scenarios
+
+#: Significant digits of the certificate's rationals.
+DIGITS = 9
+GOLDEN_VECTORS = 24
+_MEANING = {
+    "beta": "proportional gain",
+    "epsilon": "adaptation gain",
+    "delta": "adaptation rate",
+    "sigma": "leakage of the adaptation",
+}
+
+
+def build(
+    problem: Problem, gains: tuple[Gains, ...], found: Composition, validation: dict[str, Any],
+    provenance: dict[str, Any],
+) -> dict[str, Any]:
+    """The document of a design, without its obligations and hashes; see `seal`."""  # fmt: skip
+    return {
+        "schema": checker.SCHEMA,
+        "study": resolved(problem),
+        "controller": _controller(problem),
+        "gains": _gains(problem, gains),
+        "reference": reference_data(problem.reference),
+        "assumptions": _assumptions(problem),
+        "certificate": _certificate(problem, found),
+        "obligations": [],
+        "validation": validation,
+        "golden": {"vectors": golden_vectors(problem, gains)},
+        "provenance": provenance,
+    }
+
+
+def seal(document: dict[str, Any]) -> dict[str, Any]:
+    """Add the hashes of the study, the reference and the whole."""
+    sealed = dict(document)
+    for part in ("study", "reference"):
+        section = {key: value for key, value in sealed[part].items() if key != "sha256"}
+        sealed[part] = {**section, "sha256": checker.digest(section)}
+    sealed.pop("sha256", None)
+    sealed["sha256"] = checker.digest(sealed, "provenance")
+    return sealed
+
+
+def prove(document: dict[str, Any]) -> tuple[dict[str, Any], checker.Report]:
+    """Fill in the obligations with the checker's verdicts, seal, and check the finished text."""
+    draft = {**document, "obligations": [{"name": name} for name in checker.REQUIRED["rac"]]}
+    report = checker.check_text(to_text(seal(draft)))
+    entries = [
+        {"name": o.name, "statement": o.statement, "margin": o.margin, "unit": o.unit, "verdict": o.verdict}
+        for o in report.obligations
+    ]
+    finished = seal({**document, "obligations": entries})
+    return finished, checker.check_text(to_text(finished)) if report.status == 0 else report
+
+
+def to_text(document: dict[str, Any]) -> str:
+    """JSON text; floats round-trip, no NaN."""
+    return json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a whole file or nothing: a temporary file in the same folder, then a rename.
+
+    Raises:
+        InvalidInput: the place cannot be written.
+    """
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    except OSError as error:
+        raise InvalidInput(f"{path}: cannot write there: {error.strerror}; choose a writable folder") from None
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InvalidInput(f"{path}: cannot write there: {error.strerror}; choose another name") from None
+    finally:
+        Path(temporary).unlink(missing_ok=True)
+
+
+def check_writable(path: Path) -> None:
+    """Refuse an output place before any work is done.
+
+    Raises:
+        InvalidInput: the folder is missing or not writable, or the path is a folder.
+    """
+    if path.is_dir():
+        raise InvalidInput(f"{path}: is a folder; give a file name")
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    except OSError as error:
+        raise InvalidInput(f"{path}: cannot write there: {error.strerror}; choose a writable folder") from None
+    os.close(handle)
+    Path(temporary).unlink()
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Read a gain file that matches its hashes and schema.
+
+    Raises:
+        InvalidInput: one line on what is wrong with the file.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
+        raise InvalidInput(f"{path}: cannot read the gain file: {reason}; check the path") from None
+    try:
+        data = checker.parse(text)
+        checker.need(data.get("schema") == checker.SCHEMA, checker.wrong_schema(data.get("schema")))
+        checker.check_digests(text)
+    except checker.Unreadable as error:
+        raise InvalidInput(f"{path}: unreadable: {error}") from None
+    return json.loads(text)
+
+
+def gains_of(document: dict[str, Any]) -> tuple[Gains, ...]:
+    """The gains of a document, one for each governed row."""
+    values = {entry["name"]: float(entry["value"]) for entry in document["gains"]}
+    count = len(values) // len(KINDS)
+    return tuple(Gains(**{kind: values[f"{kind}_{k + 1}"] for kind in KINDS}) for k in range(count))
+
+
+def reference_of(document: dict[str, Any]) -> Reference:
+    """The reference of a document."""
+    return Reference(
+        segments=tuple(
+            Spline(knots=np.array(s["knots"], dtype=float), coefficients=np.array(s["coefficients"], dtype=float))
+            for s in document["reference"]["segments"]
+        )
+    )
+
+
+def reference_data(reference: Reference) -> dict[str, Any]:
+    """The `reference` section."""
+    names = (("position", "m"), ("speed", "m/s"), ("acceleration", "m/s^2"), ("jerk", "m/s^3"))
+    return {
+        "segments": [
+            {"degree": 5, "knots": s.knots.tolist(), "coefficients": s.coefficients.tolist()}
+            for s in reference.segments
+        ],
+        "derivative_bounds": [
+            {"name": name, "unit": unit, "lower": low, "upper": high}
+            for (name, unit), (low, high) in zip(names, reference.bounds(), strict=True)
+        ],
+    }
+
+
+def golden_vectors(problem: Problem, gains: tuple[Gains, ...]) -> list[dict[str, Any]]:
+    """Inputs and outputs of one control period along the first scenario, so that a port can be tested."""
+    first: Scenario = scenarios(problem.study)[0]
+    trace = problem.loop.run(gains, problem.reference, first)
+    law = problem.law.step_function(problem.bounds.period)
+    nominal, load = list(problem.plant.values().values()), problem.loop.nominal_load
+    vectors = []
+    for k in np.linspace(0, trace.t.size - 1, GOLDEN_VECTORS).astype(int):
+        x, r, theta = trace.x[:, k], trace.r[:, k], trace.theta[:, k]
+        u, following, _ = law(x, r, theta, np.array(gain_columns(gains)), nominal, load)
+        columns = {"x": x, "r": r, "theta": theta, "u": np.array(u).ravel(), "theta_next": np.array(following).ravel()}
+        vectors.append({key: [float(v) for v in values] for key, values in columns.items()})
+    return vectors
+
+
+def _controller(problem: Problem) -> dict[str, Any]:
+    section = problem.study.controller
+    return {
+        "law": section.law,
+        "modelling": list(section.modelling),
+        "rate_hz": section.rate_hz,
+        "period_s": problem.bounds.period,
+        "subsystems": [
+            {"state": row.state, "unit": row.unit, "tracks": row.target, "governed": row.governed}
+            for row in problem.law.rows
+        ],
+        "nominal": dict(problem.bounds.nominal),
+    }
+
+
+def _gains(problem: Problem, gains: tuple[Gains, ...]) -> list[dict[str, Any]]:
+    values = [getattr(g, kind) for g in gains for kind in KINDS]
+    entries = []
+    for value, item in zip(values, problem.ranges, strict=True):
+        kind, _, subsystem = item.name.partition("_")
+        state = problem.plant.states[problem.law.governed[int(subsystem) - 1]]
+        entries.append({
+            "name": item.name, "value": value, "unit": item.unit, "min": item.low, "max": item.high,
+            "meaning": f"{_MEANING[kind]} of subsystem {subsystem} ({state})", "dtype": "float32",
+        })  # fmt: skip
+    return entries
+
+
+def _assumptions(problem: Problem) -> list[dict[str, Any]]:
+    bounds, plant = problem.bounds, problem.plant
+    entries = []
+    for name, p in plant.parameters.items():
+        interval = bounds.parameters[name]
+        entries.append((f"parameter.{name}", interval.low, interval.high, p.unit, p.source))
+    for name, interval in bounds.disturbances.items():
+        entries.append((f"disturbance.{name}", interval.low, interval.high, "N", "study"))
+    for kind, values in (("noise", bounds.noise), ("initial", bounds.initial)):
+        for state, unit, value in zip(plant.states, plant.state_units, values, strict=True):
+            entries.append((f"{kind}.{state}", -value, value, unit, "study"))
+    keys = ("name", "lower", "upper", "unit", "source")
+    return [dict(zip(keys, entry, strict=True)) for entry in entries]
+
+
+def _certificate(problem: Problem, found: Composition) -> dict[str, Any]:
+    return {
+        "kind": "composition",
+        "model": problem.model.to_data(),
+        "decay": short(found.decay),
+        "weights": [short(v) for v in found.weights],
+        "young": [short(v) for v in found.young],
+        "leak": [short(v) for v in found.leak],
+        "radii": [short(v, up=True) for v in found.radii],
+        "held": [short(v, up=True) for v in found.held],
+        "envelope": {
+            "initial": [short(v) for v in problem.bounds.initial],
+            "rate": short(found.decay),
+            "ball": [short(v * (1 + 1e-6), up=True) for v in found.ball],
+        },
+    }
+
+
+def short(value: float, *, up: bool = False) -> str:
+    """A short rational near a float, as "p/q" text; not below it where `up`."""
+    context = Context(prec=DIGITS, rounding=ROUND_CEILING if up else ROUND_HALF_EVEN)
+    return str(Fraction(context.create_decimal(Decimal(value))))

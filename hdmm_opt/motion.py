@@ -1,0 +1,142 @@
+"""From a study's `[reference]` to a reference that respects its limits for all t."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import casadi as ca
+import numpy as np
+
+from stability import Interval, enclose, from_casadi
+from trajectories import (
+    LimitViolated,
+    MotionLimits,
+    Reference,
+    Spline,
+    Task,
+    constant,
+    effort_peaks,
+    quintic,
+    shortest_duration,
+    solve,
+    violations,
+)
+
+from .errors import InvalidInput
+from .plants import EFFORTS, Plant, effort
+from .study import Study
+
+#: The effort limit of the study that bounds each entry of `EFFORTS`.
+_LIMIT_OF = ("torque_nm", "torque_nm", "current_a", "current_a", "voltage_v")
+
+
+def build_reference(study: Study, plant: Plant) -> Reference:
+    """Moves through the waypoints, with a dwell before, between and after.
+
+    Args:
+        study: The study.
+        plant: Its plant.
+
+    Returns:
+        The reference. Speed, acceleration, jerk and stroke hold for all t by control points, torque, current and
+        voltage (at nominal parameters and the largest load) by interval enclosure of every span.
+
+    Raises:
+        InvalidInput: a move breaks a limit; the message names it and what would do.
+    """
+    section = study.reference
+    segments: list[Spline] = []
+    clock = 0.0
+    for k, (start, goal) in enumerate(zip(section.waypoints_m, section.waypoints_m[1:], strict=False)):
+        if section.dwell_s > 0:
+            segments.append(constant(start, clock, clock + section.dwell_s))
+            clock = segments[-1].end
+        try:
+            segments.append(_move(study, plant, k, start, goal, clock))
+        except LimitViolated as error:
+            raise InvalidInput(f"reference: move {k + 1} cannot be reached: {error}") from None
+        clock = segments[-1].end
+    if section.dwell_s > 0:
+        segments.append(constant(section.waypoints_m[-1], clock, clock + section.dwell_s))
+    return Reference(segments=tuple(segments))
+
+
+def _move(study: Study, plant: Plant, k: int, start: float, goal: float, clock: float) -> Spline:
+    section = study.reference
+    task = _task(study, plant, k, start, goal)
+    if section.kind == "bspline":
+        return solve(task, clock).spline
+    spline = quintic(start, goal, clock, section.durations_s[k])
+    broken = violations(spline, task.limits)
+    if broken:
+        limits = section.limits
+        least = shortest_duration(goal - start, limits.speed_m_s, limits.acceleration_m_s2, limits.jerk_m_s3)
+        remedy = "move the waypoint" if broken[0].startswith("position") else f"{1.02 * least:.3g} s would do"
+        raise LimitViolated(f"{broken[0]} in {section.durations_s[k]:g} s; {remedy}")
+    peaks = effort_peaks(spline, task.enclose, task.effort_limits)
+    for name, peak, limit in zip(EFFORTS, peaks, task.effort_limits, strict=True):
+        if not peak <= limit:
+            raise LimitViolated(
+                f"{name} needs up to {peak:.4g}, the limit is {limit:g}; allow more time or raise the limit"
+            )
+    return spline
+
+
+def _task(study: Study, plant: Plant, k: int, start: float, goal: float) -> Task:
+    section, limits = study.reference, study.reference.limits
+    load = max(study.uncertainty.load_force_n, key=abs)
+    function = effort(plant, load)
+    bounded = [getattr(limits, name) for name in _LIMIT_OF]
+    energy = section.objective == "energy" and section.kind == "bspline"
+    return Task(
+        start=start,
+        goal=goal,
+        limits=MotionLimits(
+            speed=limits.speed_m_s,
+            acceleration=limits.acceleration_m_s2,
+            jerk=limits.jerk_m_s3,
+            position=plant.stroke,
+        ),
+        effort=function,
+        effort_names=EFFORTS,
+        effort_limits=tuple(1e9 if value is None else value for value in bounded),
+        enclose=enclosure(function),
+        objective="energy" if energy else "time",
+        longest=section.durations_s[k] if section.durations_s else section.longest_s,
+        spans=section.spans,
+    )
+
+
+def enclosure(function: ca.Function) -> Callable[[list[tuple[float, float]]], list[float]]:
+    """Rigorous upper bounds of an effort function over ranges of position … jerk."""
+    names = ("x", "v", "a", "j")
+    z = ca.SX.sym("z", 4)
+    expression = from_casadi(ca.Function("flat", [z], [function(z[0], z[1], z[2], z[3])[0]]), names)
+
+    def bound(ranges: list[tuple[float, float]]) -> list[float]:
+        box = {name: Interval(low, high) for name, (low, high) in zip(names, ranges, strict=True)}
+        return [interval.high for interval in enclose(expression, box)]
+
+    return bound
+
+
+def effort_table(study: Study, plant: Plant, reference: Reference) -> list[dict[str, float | str | None]]:
+    """Peak of every limited quantity over the reference, beside its limit."""
+    limits = study.reference.limits
+    rows: list[dict[str, float | str | None]] = []
+    bounds = reference.bounds()
+    for order, (name, unit, limit) in enumerate(
+        (("speed", "m/s", limits.speed_m_s), ("acceleration", "m/s^2", limits.acceleration_m_s2),
+         ("jerk", "m/s^3", limits.jerk_m_s3)), 1,
+    ):  # fmt: skip
+        rows.append({"quantity": name, "unit": unit, "peak": max(map(abs, bounds[order])), "limit": limit})
+    load = max(study.uncertainty.load_force_n, key=abs)
+    t = np.linspace(0.0, reference.duration, 4001)
+    values = np.array(effort(plant, load).map(t.size)(*(row[None, :] for row in reference(t)))[0])
+    sampled = [np.abs(values[0]).max(), np.abs(values[2]).max(), values[4].max()]
+    for peak, (name, unit) in zip(sampled, (("torque", "N m"), ("current", "A"), ("voltage", "V")), strict=True):
+        limit = getattr(limits, {"torque": "torque_nm", "current": "current_a", "voltage": "voltage_v"}[name])
+        rows.append({"quantity": name, "unit": unit, "peak": float(peak), "limit": limit})
+    assert all(math.isfinite(float(row["peak"] or 0.0)) for row in rows)
+    return rows

@@ -1,0 +1,234 @@
+"""A study made concrete: plant, law, reference, assumptions, and the closed loop that simulates it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stability import Bounds, Gains, Interval, LoopModel
+from trajectories import Reference
+
+from .control import RAC
+from .errors import InvalidInput
+from .motion import build_reference
+from .plants import Parameter, Plant, pmsm_emla
+from .simulation import ClosedLoop
+from .study import Study, nearest
+
+Array = NDArray[np.float64]
+
+KINDS = ("beta", "epsilon", "delta", "sigma")
+_SUFFIX = {"m": "m", "m/s": "m_s", "N m": "nm", "A": "a"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class GainRange:
+    """A gain of the study: fixed, or between two values.
+
+    Attributes:
+        name: Name in the study, for example "beta_1".
+        low: Smallest value.
+        high: Largest value; equal to `low` for a fixed gain.
+        unit: SI unit.
+    """
+
+    name: str
+    low: float
+    high: float
+    unit: str
+
+    @property
+    def fixed(self) -> bool:
+        """True where nothing is searched."""
+        return self.low == self.high
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """Everything that the pipeline works on.
+
+    Attributes:
+        study: The study.
+        plant: The plant.
+        law: The law.
+        model: Plant and law as data.
+        reference: The reference.
+        bounds: The assumptions of the proof.
+        box: Largest set of errors that the proof may use. Shape (n,).
+        ranges: The gains, four for each governed row.
+        loop: The closed loop for simulation.
+    """
+
+    study: Study
+    plant: Plant
+    law: RAC
+    model: LoopModel
+    reference: Reference
+    bounds: Bounds
+    box: Array
+    ranges: tuple[GainRange, ...]
+    loop: ClosedLoop
+
+    @property
+    def searched(self) -> list[int]:
+        """Indices of the gains that are not fixed."""
+        return [i for i, gain in enumerate(self.ranges) if not gain.fixed]
+
+    def gains(self, point: Array) -> tuple[Gains, ...]:
+        """Gains at a point of the unit cube, logarithmic in every range, as decimals of four digits."""
+        values = [gain.low for gain in self.ranges]
+        for index, share in zip(self.searched, point, strict=True):
+            gain = self.ranges[index]
+            exact = gain.low * (gain.high / gain.low) ** float(share)
+            values[index] = min(max(float(f"{exact:.4g}"), gain.low), gain.high)
+        return tuple(Gains(**dict(zip(KINDS, values[k : k + 4], strict=True))) for k in range(0, len(values), 4))
+
+    def point(self, gains: tuple[Gains, ...]) -> Array:
+        """The point of the unit cube that stands for some gains."""
+        values = [getattr(g, kind) for g in gains for kind in KINDS]
+        shares = []
+        for index in self.searched:
+            gain = self.ranges[index]
+            shares.append(math.log(values[index] / gain.low) / math.log(gain.high / gain.low))
+        return np.clip(np.array(shares), 0.0, 1.0)
+
+
+def assemble(study: Study, reference: Reference | None = None) -> Problem:
+    """Build the plant, the law, the reference and the assumptions of a study.
+
+    Args:
+        study: A validated study.
+        reference: A reference that was already built for it.
+
+    Raises:
+        InvalidInput: an unreachable reference, or a section that does not fit the plant.
+    """
+    plant = pmsm_emla(study.plant.level, study.plant.resolved())
+    try:
+        law = RAC(plant=plant, modelling=study.controller.modelling)
+    except ValueError as error:
+        raise InvalidInput(f"controller: {error}") from None
+    noise = _by_state("uncertainty.noise", study.uncertainty.noise, plant)
+    initial = _by_state("uncertainty.initial", study.uncertainty.initial, plant)
+    ranges = _ranges(study, law)
+    reference = build_reference(study, plant) if reference is None else reference
+    low, high = study.uncertainty.load_force_n
+    nominal = {**plant.values(), "load_force": (low + high) / 2}
+    bounds = Bounds(
+        parameters={name: parameter_range(p) for name, p in plant.parameters.items()},
+        disturbances={"load_force": Interval(low, high)},
+        nominal=nominal,
+        reference=_reference_ranges(reference),
+        noise=noise,
+        initial=initial,
+        period=1 / study.controller.rate_hz,
+    )
+    loop = ClosedLoop(
+        law=law, period=bounds.period, noise=noise, initial=initial, nominal_load=nominal["load_force"]
+    )
+    return Problem(
+        study=study, plant=plant, law=law, model=law.loop_model(), reference=reference, bounds=bounds,
+        box=_box(plant), ranges=ranges, loop=loop,
+    )  # fmt: skip
+
+
+def parameter_range(parameter: Parameter) -> Interval:
+    """The assumed range of a parameter, rounded outwards; a point where the tolerance is zero."""
+    if parameter.tolerance == 0:
+        return Interval(parameter.value)
+    spread = abs(parameter.value) * parameter.tolerance
+    return Interval(parameter.value) + Interval.symmetric(spread * (1 + 1e-15))
+
+
+def _reference_ranges(reference: Reference) -> tuple[Interval, Interval, Interval, Interval]:
+    """Position … jerk, widened by a billionth: the checker recomputes them in exact arithmetic."""
+    ranges = []
+    for low, high in reference.bounds():
+        room = 1e-9 * max(abs(low), abs(high))
+        ranges.append(Interval(low - room, high + room))
+    return (ranges[0], ranges[1], ranges[2], ranges[3])
+
+
+def _box(plant: Plant) -> Array:
+    """Errors beyond these are no operating point: a tenth of the stroke, and three times each limit."""
+    box = [0.1 * (plant.stroke[1] - plant.stroke[0])]
+    for state in plant.states[1:]:
+        limits = [limit.value for limit in plant.limits if state in limit.signals]
+        box.append(3.0 * (limits[0] if limits else plant.limits[0].value))
+    return np.array(box)
+
+
+def state_key(plant: Plant, state: str) -> str:
+    """The key of a state in a study: its name and its unit."""
+    unit = plant.state_units[plant.states.index(state)]
+    return state if state in ("i_q", "i_d") and unit != "A" else f"{state}_{_SUFFIX[unit]}"
+
+
+def _by_state(section: str, given: dict[str, float], plant: Plant) -> tuple[float, ...]:
+    keys = [state_key(plant, state) for state in plant.states]
+    for name in given:
+        if name not in keys:
+            raise InvalidInput(f'unknown key "{section}.{name}"; {nearest(name, keys)}')
+    return tuple(given.get(key, 0.0) for key in keys)
+
+
+def _ranges(study: Study, law: RAC) -> tuple[GainRange, ...]:
+    wanted = [f"{kind}_{k + 1}" for k in range(len(law.governed)) for kind in KINDS]
+    given = study.controller.gains
+    for name in given:
+        if name not in wanted:
+            raise InvalidInput(f'unknown key "controller.gains.{name}"; {nearest(name, wanted)}')
+    defaults = {"epsilon": 0.0, "delta": 1.0, "sigma": 1.0}
+    result = []
+    for k, row in enumerate(law.governed):
+        for kind in KINDS:
+            name = f"{kind}_{k + 1}"
+            entry = given.get(name)
+            if entry is None and kind == "beta":
+                raise InvalidInput(f'"controller.gains.{name}" is required and missing; give value, or min and max')
+            if entry is None:
+                low = high = defaults[kind]
+            elif entry.value is not None:
+                low = high = entry.value
+            else:
+                low, high = float(entry.min or 0.0), float(entry.max or 0.0)
+            if kind != "epsilon" and not low > 0:
+                raise InvalidInput(f"controller.gains.{name} must be positive: got {low:g}; correct the value")
+            result.append(GainRange(name=name, low=low, high=high, unit=_unit(law, row, kind)))
+    return tuple(result)
+
+
+def _unit(law: RAC, row: int, kind: str) -> str:
+    """Units: β maps Q_i to κ_i, ε θ̂ has the unit of β, θ̂ that of ε Q² / (2σ)."""
+    own = law.rows[row].unit
+    followers = [r.unit for r in law.rows if r.target == row]
+    control = followers[0] if followers else law.plant.input_unit
+    if kind in ("delta", "sigma"):
+        return "1" if kind == "delta" else "1/s"
+    ratio = f"({control})/({own})"
+    return ratio if kind == "beta" else f"sqrt({ratio}/s)/({own})"
+
+
+def resolved(problem: Problem) -> dict[str, Any]:
+    """The study with every default filled in, as JSON data for the gain file."""
+    study, plant = problem.study, problem.plant
+    data = study.model_dump(mode="json", exclude_none=True)
+    data["plant"]["parameters"] = {
+        name: {"value": p.value, "unit": p.unit, "tolerance": p.tolerance, "source": p.source, "meaning": p.meaning}
+        for name, p in plant.parameters.items()
+    }
+    data["plant"]["limits"] = [
+        {"name": x.name, "signals": list(x.signals), "value": x.value, "unit": x.unit, "source": x.source}
+        for x in plant.limits
+    ]
+    data["plant"]["stroke_m"] = list(plant.stroke)
+    data["uncertainty"] = {
+        "disturbances": {"load_force": list(study.uncertainty.load_force_n)},
+        "noise": dict(zip(plant.states, problem.bounds.noise, strict=True)),
+        "initial": dict(zip(plant.states, problem.bounds.initial, strict=True)),
+    }
+    return data

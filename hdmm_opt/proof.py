@@ -1,0 +1,227 @@
+"""From gains to a certificate, and from a missing certificate to what would have to change.
+
+Verdicts here steer the search and explain refusals. A gain file is written only after `stability/checker.py` has proved
+the finished document.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stability import Composition, Failure, Gains, certify
+
+from .problem import Problem
+
+#: Limits and requirements must hold with this relative room, so that the exact check, which rounds outwards, agrees.
+HEADROOM = 2e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """One obligation, decided.
+
+    Attributes:
+        name: Name of the obligation.
+        statement: What had to be shown.
+        margin: Distance from failing, [unit]; negative where it fails.
+        unit: Unit of the margin.
+        verdict: "proved", "refuted" or "undecided".
+        remedy: What would make it pass; empty where it passes.
+    """
+
+    name: str
+    statement: str
+    margin: float
+    unit: str
+    verdict: str
+    remedy: str = ""
+
+
+def certificate(problem: Problem, gains: tuple[Gains, ...], *, period: float | None = None) -> Composition | Failure:
+    """Search a certificate at the study's control period, or at another one (0: a continuous law)."""
+    bounds = problem.bounds if period is None else replace(problem.bounds, period=period)
+    found = certify(problem.model, bounds, gains, problem.box)
+    if not any(g.epsilon > 0 for g in gains):
+        return found
+    adaptive = certify(problem.model, bounds, gains, problem.box, adaptive=True)
+    return min((found, adaptive), key=lambda c: violation(problem, c, gains))
+
+
+def slacks(problem: Problem, found: Composition) -> list[tuple[str, float, float, str]]:
+    """Limits over the certified set as (name, certified size, limit, unit): norms, stroke, tracking error."""
+    rows, plant = found.rows, problem.plant
+    result = []
+    for limit in plant.limits:
+        sizes = [
+            rows.effort[plant.inputs.index(s)] if s in plant.inputs else rows.states[plant.states.index(s)]
+            for s in limit.signals
+        ]
+        result.append((limit.name, float(np.linalg.norm(sizes)), limit.value, limit.unit))
+    low, high = problem.bounds.reference[0].low, problem.bounds.reference[0].high
+    room = min(low - plant.stroke[0], plant.stroke[1] - high)
+    result.append(("stroke", float(found.radii[0]), room, "m"))
+    result.append(("tracking error", float(found.ball[0]), problem.study.requirements.tracking_error_m, "m"))
+    return result
+
+
+def violation(problem: Problem, found: Composition | Failure, gains: tuple[Gains, ...]) -> float:
+    """How far some gains are from being proved; 0 where a certificate exists and every limit holds over its set."""
+    late = sum(max(0.0, problem.bounds.period * g.delta * g.sigma - 1.0) for g in gains)
+    if isinstance(found, Failure):
+        return 10.0 + late
+    excess = (size * (1 + HEADROOM) / limit - 1.0 for _, size, limit, _ in slacks(problem, found))
+    return late + sum(max(0.0, value) for value in excess)
+
+
+def longest_period(problem: Problem, gains: tuple[Gains, ...], *, steps: int = 12) -> float:
+    """The largest control period at which everything is certified, s, by bisection from below; 0 where none is."""
+
+    def good(period: float) -> bool:
+        return violation(problem, certificate(problem, gains, period=period), gains) == 0.0
+
+    high = problem.bounds.period
+    low = high / 2.0**steps
+    if not good(low):
+        return 0.0
+    if good(high):
+        return high
+    for _ in range(steps):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if good(middle) else (low, middle)
+    return low
+
+
+def diagnose(problem: Problem, gains: tuple[Gains, ...]) -> list[Verdict]:
+    """Why some gains are not proved: the failing obligations, the cause before its consequences.
+
+    The continuous law is looked at first: what fails there (gain conditions, authority, accuracy) does not come from
+    sampling. Authority is refuted where a simulated run inside the assumptions asks for more than the limit.
+    """
+    continuous = certificate(problem, gains, period=0.0)
+    found = [*_authority(problem, gains, continuous), *_conditions(problem, continuous)]
+    if not found:
+        found = [*_sampling(problem, gains)]
+    return found
+
+
+def _authority(problem: Problem, gains: tuple[Gains, ...], continuous: Composition | Failure) -> list[Verdict]:
+    limit = problem.plant.limits[0]
+    name, unit = limit.name, limit.unit
+    if isinstance(continuous, Composition):
+        worst = [(n, size, top, u) for n, size, top, u in slacks(problem, continuous) if n != "tracking error"]
+        name, size, top, unit = max(worst, key=lambda entry: entry[1] / entry[2])
+        if size <= top:
+            return []
+        statement = f"the certified set asks for {size:.4g} {unit} of {name}, the limit is {top:.4g} {unit}"
+        return [_authority_verdict(problem, gains, statement, top - size, unit, "undecided")]
+    demand, scenario = largest_demand(problem, gains)
+    if demand <= limit.value:
+        return []
+    statement = (
+        f"simulated without sampling, the law asks for {demand:.4g} {unit} of {name} in scenario {scenario}; "
+        f"the limit is {limit.value:.4g} {unit}"
+    )
+    return [_authority_verdict(problem, gains, statement, limit.value - demand, unit, "refuted")]
+
+
+def _authority_verdict(
+    problem: Problem, gains: tuple[Gains, ...], statement: str, margin: float, unit: str, verdict: str
+) -> Verdict:
+    missing = [t for t in ("mechanics", "resistance", "back_emf", "decoupling") if t not in problem.law.modelling]
+    if problem.plant.level == "torque":
+        missing = [term for term in missing if term == "mechanics"]
+    remedy = f"lower the demand by {-margin:.4g} {unit} (slower reference, smaller load range, smaller gains)"
+    for terms in ([t] for t in missing if t == "back_emf"):
+        helped = _demand_with(problem, gains, (*problem.law.modelling, *terms))
+        if helped <= problem.plant.limits[0].value:
+            remedy = f'add the modelling term "{terms[0]}": the demand in the same scenarios falls to {helped:.4g} {unit}'
+    return Verdict(
+        name="authority", statement=statement, margin=margin, unit=unit, verdict=verdict, remedy=remedy
+    )
+
+
+def largest_demand(problem: Problem, gains: tuple[Gains, ...]) -> tuple[float, str]:
+    """The largest input norm that the law asks for in the study's scenarios, before the amplitude limit, and where.
+
+    The law runs at eight times the study's rate or faster, so that sampling plays no part.
+    """
+    from .simulation import ClosedLoop
+    from .validation import scenarios
+
+    period = min(problem.bounds.period / 8, 1 / 16000)
+    loop = ClosedLoop(
+        law=problem.law, period=period, noise=problem.bounds.noise, initial=problem.bounds.initial,
+        nominal_load=problem.loop.nominal_load,
+    )  # fmt: skip
+    demands = []
+    for scenario in scenarios(problem.study):
+        trace = loop.run(gains, problem.reference, replace(scenario, noise=0.0))
+        demands.append((loop.demand(trace, gains), scenario.name))
+    return max(demands)
+
+
+def _demand_with(problem: Problem, gains: tuple[Gains, ...], modelling: tuple[str, ...]) -> float:
+    from .control import RAC
+
+    law = RAC(plant=problem.plant, modelling=modelling)
+    return largest_demand(replace(problem, law=law, model=law.loop_model()), gains)[0]
+
+
+def _conditions(problem: Problem, continuous: Composition | Failure) -> list[Verdict]:
+    if isinstance(continuous, Failure):
+        row = continuous.row
+        where = f" at subsystem {row + 1} ({problem.plant.states[row]})" if row is not None else ""
+        return [
+            Verdict(
+                name="composition",
+                statement=f"the gain conditions of the continuous law: {continuous.reason}{where}",
+                margin=_row_margin(continuous),
+                unit="1/s",
+                verdict="undecided",
+                remedy="separate the bandwidths (a larger gain in that row or a smaller one before it), add a "
+                "modelling term for that row, or narrow the tolerances that enter it",
+            )
+        ]
+    name, size, limit, unit = slacks(problem, continuous)[-1]
+    if size <= limit:
+        return []
+    return [
+        Verdict(
+            name="accuracy", statement=f"the certified {name} is {size * 1e3:.4g} mm, {limit * 1e3:.4g} mm is required",
+            margin=limit - size, unit=unit, verdict="undecided",
+            remedy=f"larger gains, a narrower load range, or a requirement of {1.01 * size * 1e3:.3g} mm",
+        )
+    ]  # fmt: skip
+
+
+def _row_margin(failure: Failure) -> float:
+    """How much more decay the weakest row of the last iterate would need for diagonal dominance, 1/s; negative."""
+    if failure.rows is None:
+        return -math.inf
+    low, high, mass = failure.rows.low, failure.rows.high, failure.rows.mass_high
+    scale = np.ones(len(mass)) if failure.needed is None else failure.needed
+    size = np.maximum(np.abs(low), np.abs(high)) * scale[None, :] / scale[:, None]
+    np.fill_diagonal(size, 0.0)
+    spare = (-np.diag(high) - size.sum(axis=1)) / mass
+    return float(min(spare.min(), 0.0))
+
+
+def _sampling(problem: Problem, gains: tuple[Gains, ...]) -> list[Verdict]:
+    period = problem.bounds.period
+    longest = longest_period(problem, gains)
+    sampled = certificate(problem, gains)
+    detail = sampled.reason if isinstance(sampled, Failure) else "a limit is passed over the certified set"
+    if longest == 0.0:
+        remedy = "no control period was found that would do; smaller gains in the last row would help"
+    else:
+        remedy = f"a control period of at most {longest * 1e6:.4g} us ({1 / longest:.6g} Hz or faster) would do"
+    return [
+        Verdict(
+            name="sampling",
+            statement=f"held inputs at {1 / period:g} Hz (period {period * 1e6:g} us): {detail}",
+            margin=(longest - period) * 1e6, unit="us", verdict="undecided", remedy=remedy,
+        )
+    ]  # fmt: skip

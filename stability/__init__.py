@@ -1,0 +1,15 @@
+"""Stability: bounds, gain conditions and certificates of strict-feedback loops, and their stand-alone checker."""
+
+from .composition import Composition as Composition
+from .composition import Failure as Failure
+from .composition import certify as certify
+from .expression import Expression as Expression
+from .expression import enclose as enclose
+from .expression import from_casadi as from_casadi
+from .interval import Interval as Interval
+from .model import Bounds as Bounds
+from .model import Gains as Gains
+from .model import LoopModel as LoopModel
+from .model import Row as Row
+from .rows import ErrorRows as ErrorRows
+from .rows import error_rows as error_rows

@@ -1,0 +1,1041 @@
+"""Re-prove a gain file from the file alone: `python checker.py gains.json`.
+
+A second program. It imports nothing but Python's standard library and trusts no number that the producer derived: from
+the assumptions, the gains and the model in the file it encloses the closed loop in rational interval arithmetic with
+outward rounding, builds every matrix inequality itself, and decides each by exact rational LDLᵀ. What it takes as given
+is the statement: the plant and the law as operation lists, the assumptions, the study.
+
+Exit status: 0 everything proved, 1 something is not, 2 a file that cannot be read.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import math
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+SCHEMA = "hdmm-opt/gains/1"
+#: What must be proved for each law; a file that leaves one out is refused.
+REQUIRED = {
+    "rac": (
+        "non-vacuity", "reference", "composition", "invariance", "authority", "sampling", "adaptation", "rounding",
+        "accuracy",
+    )
+}  # fmt: skip
+MAX_BYTES, MAX_DIGITS, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 20_000_000, 400, 5_000, 12, 5_000
+#: Relative width given to every gain, so that the proof holds for its decimal, its float64 and its float32.
+ROUNDING = Fraction(1, 2**23)
+BITS = 96
+
+
+class Unreadable(Exception):
+    """The file is not a well-formed gain file."""
+
+
+class NotProved(Exception):
+    """A bound does not exist."""
+
+
+def need(condition: bool, message: str) -> None:
+    """Raise `Unreadable` unless the condition holds."""
+    if not condition:
+        raise Unreadable(message)
+
+
+# --- intervals: pairs (low, high) of Fractions, rounded outwards to BITS significant bits -------------------------
+
+Interval = tuple[Fraction, Fraction]
+ZERO: Interval = (Fraction(0), Fraction(0))
+ONE: Interval = (Fraction(1), Fraction(1))
+
+
+def down(x: Fraction) -> Fraction:
+    """The largest number of BITS bits that is not above x."""
+    numerator, denominator = x.numerator, x.denominator
+    shift = BITS - (abs(numerator).bit_length() - denominator.bit_length())
+    if denominator.bit_length() <= BITS and abs(numerator).bit_length() <= BITS:
+        return x
+    if shift >= 0:
+        return Fraction((numerator << shift) // denominator, 1 << shift)
+    return Fraction((numerator // (denominator << -shift)) << -shift)
+
+
+def up(x: Fraction) -> Fraction:
+    """The smallest number of BITS bits that is not below x."""
+    return -down(-x)
+
+
+def symmetric(radius: Fraction) -> Interval:
+    """[-radius, radius]."""
+    return -abs(radius), abs(radius)
+
+
+def add(a: Interval, b: Interval) -> Interval:
+    """Sum."""
+    return down(a[0] + b[0]), up(a[1] + b[1])
+
+
+def neg(a: Interval) -> Interval:
+    """Negative."""
+    return -a[1], -a[0]
+
+
+def mul(a: Interval, b: Interval) -> Interval:
+    """Product."""
+    if a[0] == a[1] == 0 or b[0] == b[1] == 0:
+        return ZERO
+    ends = (a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1])
+    return down(min(ends)), up(max(ends))
+
+
+def inverse(a: Interval) -> Interval:
+    """Reciprocal."""
+    if a[0] <= 0 <= a[1]:
+        raise NotProved("a divisor can vanish in the assumed box")
+    return down(1 / a[1]), up(1 / a[0])
+
+
+def square(a: Interval) -> Interval:
+    """Range of x²."""
+    low, high = sorted((abs(a[0]), abs(a[1])))
+    return (Fraction(0) if a[0] <= 0 <= a[1] else down(low * low)), up(high * high)
+
+
+def root(x: Fraction, upwards: bool) -> Fraction:
+    """A rational bound on the square root."""
+    if x < 0:
+        raise NotProved("a square root of a negative number in the assumed box")
+    shift = 2 * max(0, BITS - (x.numerator.bit_length() - x.denominator.bit_length()) // 2)
+    scaled = (x.numerator << shift) // x.denominator
+    return Fraction(math.isqrt(scaled) + (1 if upwards else 0), 1 << (shift // 2)) + (
+        Fraction(1, 1 << (shift // 2)) if upwards else 0
+    )
+
+
+def exponential(x: Fraction) -> Interval:
+    """Enclosure of exp(x) by a Taylor sum on |x| <= 1/2 and repeated squaring."""
+    halvings = 0
+    while abs(x) > Fraction(1, 2):
+        x, halvings = x / 2, halvings + 1
+    term, total = Fraction(1), Fraction(1)
+    for k in range(1, 24):
+        term = term * x / k
+        total += term
+    error = 2 * abs(term)
+    value = (down(total - error), up(total + error))
+    for _ in range(halvings):
+        value = (down(value[0] * value[0]), up(value[1] * value[1]))
+    return value
+
+
+def tanh_point(x: Fraction) -> Interval:
+    """Enclosure of tanh at one number."""
+    if abs(x) > 40:
+        edge = 1 - Fraction(1, 2**100)
+        return (edge, Fraction(1)) if x > 0 else (Fraction(-1), -edge)
+    low, high = exponential(down(2 * x))[0], exponential(up(2 * x))[1]
+    return down(1 - 2 / (low + 1)), up(1 - 2 / (high + 1))
+
+
+def tanh(a: Interval) -> Interval:
+    """Range of tanh."""
+    return tanh_point(a[0])[0], tanh_point(a[1])[1]
+
+
+def magnitude(a: Interval) -> Fraction:
+    """Largest absolute value."""
+    return max(abs(a[0]), abs(a[1]))
+
+
+def meet(a: Interval, b: Interval) -> Interval:
+    """Intersection of two enclosures of the same quantity."""
+    return max(a[0], b[0]), min(a[1], b[1])
+
+
+# --- linear forms: {symbol: coefficient interval}, the constant under "" ------------------------------------------
+
+Form = dict[str, Interval]
+
+
+def plus(*forms: Form) -> Form:
+    """Sum of forms."""
+    result: Form = {}
+    for form in forms:
+        for symbol, value in form.items():
+            result[symbol] = add(result[symbol], value) if symbol in result else value
+    return result
+
+
+def times(form: Form, factor: Interval) -> Form:
+    """A form scaled by an interval."""
+    return {symbol: mul(value, factor) for symbol, value in form.items()}
+
+
+@dataclass(frozen=True)
+class Node:
+    """Value of an operation: identity, form and range."""
+
+    key: Any
+    form: Form
+    range: Interval
+
+
+@dataclass
+class Table:
+    """Ranges of all symbols, and definitions of the derived ones, oldest first."""
+
+    ranges: dict[str, Interval] = field(default_factory=lambda: {"": ONE})
+    definitions: dict[str, Form] = field(default_factory=dict)
+    names: dict[Any, str] = field(default_factory=dict)
+
+    def over(self, form: Form) -> Interval:
+        """Range of a form."""
+        total = ZERO
+        for symbol, value in form.items():
+            total = add(total, mul(value, self.ranges[symbol]))
+        return total
+
+    def node(self, key: Any, form: Form, natural: Interval) -> Node:
+        """A value whose range is the better of two enclosures."""
+        return Node(key, form, meet(natural, self.over(form)))
+
+    def fresh(self, key: Any, definition: Form, natural: Interval) -> Node:
+        """A nonlinear value: a symbol of its own, the same for the same operation."""
+        if key not in self.names:
+            name = self.names[key] = f"n{len(self.names)}"
+            self.ranges[name], self.definitions[name] = natural, definition
+        return Node(key, {self.names[key]: ONE}, natural)
+
+    def expand(self, form: Form, keep: str = "#") -> Form:
+        """Replace derived symbols by their definitions, newest first."""
+        for symbol in reversed(list(self.definitions)):
+            if symbol in form and not symbol.startswith(keep):
+                rest = {s: v for s, v in form.items() if s != symbol}
+                form = plus(rest, times(self.definitions[symbol], form[symbol]))
+        return form
+
+
+def walk(program: dict[str, Any], read: Callable[[str], Any], const: Callable[[Fraction], Any], apply: Any) -> list[Any]:
+    """Run an operation list in any arithmetic; returns every entry."""
+    table: list[Any] = []
+    for operator, *arguments in program["operations"]:
+        if operator == "input":
+            table.append(read(arguments[0]))
+        elif operator == "const":
+            table.append(const(Fraction(arguments[0])))
+        else:
+            table.append(apply(operator, *(table[i] for i in arguments)))
+    return table
+
+
+def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> list[Node]:
+    """Outputs of an operation list in linear forms."""
+
+    def const(value: Fraction) -> Node:
+        return Node(("const", value), {"": (value, value)}, (value, value))
+
+    def apply(operator: str, a: Node, b: Node | None = None) -> Node:
+        key = (operator, a.key) if b is None else (operator, *sorted((a.key, b.key), key=repr))
+        if operator in ("sub", "div") and b is not None:
+            key = (operator, a.key, b.key)
+        if operator == "neg":
+            return table.node(key, times(a.form, (Fraction(-1), Fraction(-1))), neg(a.range))
+        if operator == "tanh":
+            return table.fresh(key, {"": tanh(a.range)}, tanh(a.range))
+        if operator == "sqrt":
+            bounds = root(a.range[0], False), root(a.range[1], True)
+            return table.fresh(key, {"": bounds}, bounds)
+        if b is None:
+            return multiply(("mul", a.key, a.key), a, a)
+        if operator == "add":
+            return table.node(key, plus(a.form, b.form), add(a.range, b.range))
+        if operator == "sub":
+            return table.node(key, plus(a.form, times(b.form, neg(ONE))), add(a.range, neg(b.range)))
+        if operator == "div":
+            return table.node(key, times(a.form, inverse(b.range)), mul(a.range, inverse(b.range)))
+        return multiply(key, a, b)
+
+    def multiply(key: Any, a: Node, b: Node) -> Node:
+        natural = square(a.range) if a.key == b.key else mul(a.range, b.range)
+        for one, other in ((a, b), (b, a)):
+            if set(one.form) <= {""}:
+                return table.node(key, times(other.form, one.form.get("", ZERO)), natural)
+        wide, narrow = (a, b) if magnitude(a.range) >= magnitude(b.range) else (b, a)
+        return table.fresh(key, times(narrow.form, wide.range), natural)
+
+    entries = walk(program, inputs.__getitem__, const, apply)
+    return [entries[i] for i in program["outputs"]]
+
+
+def derivative(program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[str, Form]) -> Form:
+    """Directional derivative of the first output, enclosed over the ranges of the inputs."""
+    two = (Fraction(2), Fraction(2))
+
+    def apply(operator: str, a: tuple[Interval, Form], b: tuple[Interval, Form] | None = None) -> Any:
+        (x, dx), (y, dy) = a, b if b is not None else a
+        if operator == "neg":
+            return neg(x), times(dx, neg(ONE))
+        if operator == "tanh":
+            value = tanh(x)
+            slope = add(ONE, neg(square(value)))
+            return value, times(dx, (max(slope[0], Fraction(0)), min(slope[1], Fraction(1))))
+        if operator == "sqrt":
+            value = root(x[0], False), root(x[1], True)
+            return value, times(dx, inverse(mul(two, value)))
+        if operator == "sq":
+            return square(x), times(dx, mul(two, x))
+        if operator == "add":
+            return add(x, y), plus(dx, dy)
+        if operator == "sub":
+            return add(x, neg(y)), plus(dx, times(dy, neg(ONE)))
+        if operator == "mul":
+            return mul(x, y), plus(times(dx, y), times(dy, x))
+        ratio = mul(x, inverse(y))
+        return ratio, times(plus(dx, times(dy, neg(ratio))), inverse(y))
+
+    entries = walk(program, lambda n: (ranges[n], tangents.get(n, {})), lambda c: ((c, c), {}), apply)
+    return entries[program["outputs"][0]][1]
+
+
+# --- the statement in the file ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Gains of one governed row, as intervals."""
+
+    beta: Interval
+    epsilon: Interval
+    delta: Interval
+    sigma: Interval
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Everything that the checker reads from a file."""
+
+    rows: list[dict[str, Any]]
+    drives: list[int]
+    inputs: list[str]
+    plant: dict[str, Any]
+    law: list[dict[str, Any]]
+    parameters: dict[str, Interval]
+    disturbances: dict[str, Interval]
+    nominal: dict[str, Fraction]
+    reference: list[Interval]
+    noise: list[Fraction]
+    initial: list[Fraction]
+    period: Fraction
+    gains: list[tuple[Fraction, Fraction, Fraction, Fraction]]
+    decay: Fraction
+    weights: list[Fraction]
+    young: list[Fraction]
+    leak: list[Fraction]
+    radii: list[Fraction]
+    held: list[Fraction]
+    ball: list[Fraction]
+    limits: list[dict[str, Any]]
+    stroke: Interval
+    accuracy: Fraction
+
+    @property
+    def governed(self) -> list[int]:
+        """Indices of the rows with gains."""
+        return [i for i, row in enumerate(self.rows) if row["governed"]]
+
+
+def wrong_schema(found: Any) -> str:
+    """What to say to a file of another kind or version."""
+    return f'this release reads "{SCHEMA}": got {str(found)[:60]!r}; use the release that wrote the file'
+
+
+def number(value: Any, what: str) -> Fraction:
+    """A number of the file as an exact rational."""
+    need(not isinstance(value, bool) and isinstance(value, int | Fraction | str), f"{what} must be a number: got {value!r:.60}")
+    if isinstance(value, str):
+        return rational(value, what)
+    return Fraction(value)
+
+
+def rational(text: str, what: str = "a number") -> Fraction:
+    """Parse decimal or p/q text with bounded length and exponent."""
+    need(len(text) <= MAX_DIGITS, f"{what} has over {MAX_DIGITS} digits")
+    exponent = text.lower().rpartition("e")[2] if "e" in text.lower() else "0"
+    try:
+        need(abs(int(exponent)) <= 400, f"{what} has an exponent beyond 400: {text[:40]}")
+        return Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        raise Unreadable(f"{what} must be a finite number: got {text[:40]!r}") from None
+
+
+def numbers(value: Any, count: int, what: str) -> list[Fraction]:
+    """A list of numbers of a given length."""
+    need(isinstance(value, list) and len(value) == count, f"{what} must list {count} numbers")
+    return [number(entry, what) for entry in value]
+
+
+def parse(text: str) -> dict[str, Any]:
+    """JSON with exact decimals, no NaN, no doubled keys."""
+    need(len(text) <= MAX_BYTES, f"a gain file has at most {MAX_BYTES} bytes")
+
+    def pairs(items: list[tuple[str, Any]]) -> dict[str, Any]:
+        need(len({key for key, _ in items}) == len(items), "an object has the same key twice")
+        return dict(items)
+
+    def constant(name: str) -> Any:
+        raise Unreadable(f"{name} is not a number that a gain file may hold")
+
+    try:
+        data = json.loads(
+            text, parse_float=rational, parse_int=rational, parse_constant=constant, object_pairs_hook=pairs
+        )
+    except json.JSONDecodeError as error:
+        raise Unreadable(f"not a complete JSON file: {error.msg} at line {error.lineno}; write it again with design") from None
+    except RecursionError:
+        raise Unreadable("the JSON is nested too deeply") from None
+    need(isinstance(data, dict), "a gain file is a JSON object")
+    return data
+
+
+def digest(text_or_data: Any, *leave_out: str) -> str:
+    """SHA-256 of canonical JSON (sorted keys, no spaces, floats as Python prints them), without some top-level keys."""
+    data = json.loads(text_or_data) if isinstance(text_or_data, str) else text_or_data
+    kept = {key: value for key, value in data.items() if key not in leave_out}
+    canonical = json.dumps(kept, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    return hashlib.sha256(canonical.encode()).hexdigest()
+
+
+def check_digests(text: str) -> None:
+    """Refuse a file whose content does not match the hashes it carries."""
+    plain = json.loads(text)
+    for part in ("study", "reference"):
+        section = plain.get(part)
+        need(isinstance(section, dict), f'the section "{part}" is missing; write the file again with design')
+        need(section.get("sha256") == digest(section, "sha256"), f'"{part}" was changed after the file was written (sha256 differs)')
+    need(plain.get("sha256") == digest(plain, "sha256", "provenance"), "the file was changed after it was written (sha256 differs)")
+
+
+def valid_program(program: Any, what: str) -> dict[str, Any]:
+    """Structure of an operation list: known operators, arguments that come earlier."""
+    need(isinstance(program, dict) and isinstance(program.get("operations"), list), f"{what} must be an operation list")
+    operations, arity = program["operations"], {"neg": 1, "sq": 1, "sqrt": 1, "tanh": 1, "add": 2, "sub": 2, "mul": 2, "div": 2}
+    need(0 < len(operations) <= MAX_OPERATIONS, f"{what} must have 1 to {MAX_OPERATIONS} operations")
+    clean: list[list[Any]] = []
+    for k, entry in enumerate(operations):
+        need(isinstance(entry, list) and len(entry) >= 2 and isinstance(entry[0], str), f"{what}: operation {k} is malformed")
+        operator, *arguments = entry
+        if operator in ("input", "const"):
+            need(len(arguments) == 1 and isinstance(arguments[0], str), f"{what}: operation {k} needs one name or number")
+            if operator == "const":
+                rational(arguments[0], what)
+        else:
+            need(operator in arity and len(arguments) == arity[operator], f"{what}: unknown operation {operator!r:.30}")
+            arguments = [index(a, k, what) for a in arguments]
+        clean.append([operator, *arguments])
+    outputs = [index(o, len(clean), what) for o in program.get("outputs", [])]
+    need(bool(outputs), f"{what} has no output")
+    return {"operations": clean, "outputs": outputs}
+
+
+def index(value: Any, end: int, what: str) -> int:
+    """A whole number in [0, end)."""
+    need(isinstance(value, Fraction) and value.denominator == 1 and 0 <= value < end, f"{what}: an index is out of range")
+    return int(value)
+
+
+def reads(program: dict[str, Any], outputs: Iterable[int] | None = None) -> set[str]:
+    """Names of the inputs that some outputs depend on."""
+    needed, names = set(program["outputs"] if outputs is None else outputs), set()
+    for k in range(len(program["operations"]) - 1, -1, -1):
+        if k in needed:
+            operator, *arguments = program["operations"][k]
+            if operator == "input":
+                names.add(arguments[0])
+            elif operator != "const":
+                needed.update(arguments)
+    return names
+
+
+def read(data: dict[str, Any]) -> Claim:
+    """Read and cross-check the statement: study, assumptions, gains, model, certificate."""
+    try:
+        return _read(data)
+    except (KeyError, TypeError, AttributeError, IndexError) as error:
+        raise Unreadable(f"a part of the gain file is missing or has the wrong type: {error}") from None
+
+
+def _read(data: dict[str, Any]) -> Claim:
+    study, controller, certificate = data["study"], data["controller"], data["certificate"]
+    need(controller["law"] in REQUIRED, f'unknown law {controller["law"]!r:.40}; known: {", ".join(REQUIRED)}')
+    need(certificate["kind"] == "composition", f'unknown certificate kind {certificate["kind"]!r:.40}')
+    model = certificate["model"]
+    rows = model["rows"]
+    n, m = len(rows), len(model["inputs"])
+    need(1 <= n <= MAX_ROWS and 1 <= m <= n, f"1 to {MAX_ROWS} rows are needed: got {n}")
+    for i, row in enumerate(rows):
+        target = row["target"]
+        if target not in ("reference", "zero"):
+            row["target"] = index(target, i, "a row's target")
+            need(rows[row["target"]]["governed"] is True, "a row's target must be a governed row")
+        need(isinstance(row["governed"], bool) and isinstance(row["state"], str), "a row needs a state and governed")
+    need(rows[0]["target"] == "reference", "the first row must track the reference")
+    governed = [i for i, row in enumerate(rows) if row["governed"]]
+    drives = [index(d, n, "an input's row") for d in model["drives"]]
+    need(len(drives) == m and all(rows[d]["governed"] for d in drives), "each input must be the control of a governed row")
+    plant = valid_program(model["plant"], "the plant")
+    law = [valid_program(term, "a modelling term") for term in model["law"]]
+    need(len(plant["outputs"]) == 2 * n and len(law) == len(governed), "the model does not fit the rows")
+
+    assumed = assumptions(data["assumptions"], study)
+    states, parameters = [row["state"] for row in rows], assumed["parameter"]
+    need(len(set(states)) == n, "two rows share a state")
+    need(reads(plant, plant["outputs"][:n]) <= set(parameters), "an inertia depends on more than constant parameters")
+    known = {*states, *model["inputs"], *parameters, *assumed["disturbance"]}
+    need(reads(plant) <= known, "the plant reads a name without an assumption")
+    nominal = {name: number(value, "a nominal value") for name, value in controller["nominal"].items()}
+    for term in law:
+        allowed = {*states, *(f"r{k}" for k in range(4)), *(f"nominal.{name}" for name in nominal)}
+        need(reads(term) <= allowed, "a modelling term reads what a controller cannot know")
+
+    given = {entry["name"]: number(entry["value"], entry["name"]) for entry in data["gains"]}
+    names = [f"{kind}_{k + 1}" for k in range(len(governed)) for kind in ("beta", "epsilon", "delta", "sigma")]
+    need(set(given) == set(names) and len(data["gains"]) == len(names), "the gains do not fit the subsystems")
+    gains = [tuple(given[f"{kind}_{k + 1}"] for kind in ("beta", "epsilon", "delta", "sigma")) for k in range(len(governed))]
+    need(all(b > 0 and e >= 0 and d > 0 and s > 0 for b, e, d, s in gains), "gains must be positive")
+    rate = number(controller["rate_hz"], "rate_hz")
+    need(rate > 0 and rate == number(study["controller"]["rate_hz"], "rate_hz"), "the control rate differs from the study's")
+    limits, stroke = study["plant"]["limits"], numbers(study["plant"]["stroke_m"], 2, "stroke_m")
+    need(limits and all(set(limit["signals"]) <= {*states, *model["inputs"]} for limit in limits), "a limit names an unknown signal")
+    need(set(limits[0]["signals"]) == set(model["inputs"]), "the first limit must be the amplitude limit of the inputs")
+    return Claim(
+        rows=rows, drives=drives, inputs=model["inputs"], plant=plant, law=law, parameters=parameters,
+        disturbances=assumed["disturbance"], nominal=nominal, reference=reference_bounds(data["reference"]),
+        noise=[assumed["noise"][s][1] for s in states], initial=[assumed["initial"][s][1] for s in states],
+        period=1 / rate, gains=gains, decay=number(certificate["decay"], "decay"),
+        weights=numbers(certificate["weights"], n, "weights"), young=numbers(certificate["young"], n, "young"),
+        leak=numbers(certificate["leak"], n, "leak"), radii=numbers(certificate["radii"], n, "radii"),
+        held=numbers(certificate["held"], m, "held"), ball=numbers(certificate["envelope"]["ball"], n, "ball"),
+        limits=[{**limit, "value": number(limit["value"], "a limit")} for limit in limits],
+        stroke=(stroke[0], stroke[1]), accuracy=number(study["requirements"]["tracking_error_m"], "tracking_error_m"),
+    )  # fmt: skip
+
+
+def assumptions(entries: list[dict[str, Any]], study: dict[str, Any]) -> dict[str, dict[str, Interval]]:
+    """The assumptions by kind; each must cover what the study states."""
+    found: dict[str, dict[str, Interval]] = {kind: {} for kind in ("parameter", "disturbance", "noise", "initial")}
+    for entry in entries:
+        kind, _, name = entry["name"].partition(".")
+        bounds = number(entry["lower"], entry["name"]), number(entry["upper"], entry["name"])
+        need(kind in found and name not in found[kind], f'unknown or doubled assumption {entry["name"]!r:.60}')
+        need(bounds[0] <= bounds[1], f'{entry["name"]}: lower > upper')
+        found[kind][name] = bounds
+    uncertainty = study["uncertainty"]
+    stated: list[tuple[str, str, Fraction, Fraction]] = []
+    for name, entry in study["plant"]["parameters"].items():
+        value, spread = number(entry["value"], name), abs(number(entry["value"], name)) * number(entry["tolerance"], name)
+        stated.append(("parameter", name, value - spread, value + spread))
+    for name, (low, high) in uncertainty["disturbances"].items():
+        stated.append(("disturbance", name, number(low, name), number(high, name)))
+    for kind in ("noise", "initial"):
+        for name, value in uncertainty[kind].items():
+            stated.append((kind, name, -number(value, name), number(value, name)))
+    need({(k, n) for k, n, _, _ in stated} == {(k, n) for k, of in found.items() for n in of}, "the assumptions are not those of the study")
+    for kind, name, low, high in stated:
+        bounds = found[kind][name]
+        need(bounds[0] <= low and high <= bounds[1], f"the assumption {kind}.{name} is narrower than the study's")
+    return found
+
+
+def reference_bounds(reference: dict[str, Any]) -> list[Interval]:
+    """Position … jerk of the splines, from their control points; refuses jumps and a moving end."""
+    hulls: list[list[Fraction]] = [[], [], [], []]
+    previous: list[Fraction] | None = None
+    need(isinstance(reference["segments"], list) and reference["segments"], "the reference has no segment")
+    for segment in reference["segments"]:
+        count = len(segment["coefficients"])
+        need(segment["degree"] == 5 and 6 <= count <= MAX_COEFFICIENTS, "a segment is a spline of degree 5")
+        knots = numbers(segment["knots"], count + 6, "knots")
+        points = numbers(segment["coefficients"], count, "coefficients")
+        need(knots[0] == knots[5] and knots[-1] == knots[-6], "a segment's knots must be clamped")
+        need(all(a < b for a, b in zip(knots[5:count], knots[6 : count + 1], strict=True)), "inner knots must increase")
+        ends: list[tuple[Fraction, Fraction]] = []
+        for order in range(4):
+            hulls[order] += points
+            ends.append((points[0], points[-1]))
+            degree = 5 - order
+            points = [
+                degree * (b - a) / (knots[j + degree + 1] - knots[j + 1])
+                for j, (a, b) in enumerate(zip(points, points[1:], strict=False))
+            ]
+            knots = knots[1:-1]
+        need(previous is None or previous == [e[0] for e in ends[:3]], "the reference jumps between segments")
+        previous = [e[1] for e in ends[:3]]
+    need(previous is not None and previous[1] == previous[2] == 0, "the reference must end at rest")
+    for hull, stated in zip(hulls, reference["derivative_bounds"], strict=True):
+        room = Fraction(1, 10**8) * max(map(abs, hull))
+        low, high = number(stated["lower"], "a bound") - room, number(stated["upper"], "a bound") + room
+        need(low <= min(hull) and max(hull) <= high, f'the stated bounds on the {stated["name"]} are not those of the splines')
+    return [(min(h), max(h)) for h in hulls]
+
+
+# --- the closed loop in error coordinates -------------------------------------------------------------------------
+
+
+class Loop:
+    """M_i Q_i' = sum_j S_ij Q_j + d_i over the assumed box, with every entry an interval."""
+
+    def __init__(self, claim: Claim, inflate: Fraction) -> None:
+        self.claim, self.table = claim, Table()
+        self.gain: dict[int, Gain] = {}
+        for i, values in zip(claim.governed, claim.gains, strict=True):
+            self.gain[i] = Gain(*((v * (1 - inflate), v * (1 + inflate)) for v in values))
+        self.term = dict(zip(claim.governed, claim.law, strict=True))
+        self.theta: dict[int, Fraction] = {}
+        self.theta_rate: dict[int, Fraction] = {}
+        self.half: dict[int, Interval] = {}
+        self.noise: dict[int, Fraction] = {}
+        self.model: dict[int, Form] = {}
+        self.nodes: dict[str, Node] = {}
+        self.virtual: dict[int, Form] = {}
+        self._inputs()
+        self._rows()
+
+    def _inputs(self) -> None:
+        claim, table = self.claim, self.table
+        fixed = {f"nominal.{name}": (value, value) for name, value in claim.nominal.items()}
+        for name, bounds in {**fixed, **claim.parameters, **claim.disturbances}.items():
+            key = ("const", bounds[0]) if bounds[0] == bounds[1] else ("input", name)
+            self.nodes[name] = Node(key, {"": bounds}, bounds)
+        for k, bounds in enumerate(claim.reference):
+            table.ranges[f"r{k}"] = bounds
+            self._name(f"r{k}", {f"r{k}": ONE})
+        for i, radius in enumerate(claim.radii):
+            table.ranges[f"Q{i}"] = symmetric(radius)
+        for k, error in enumerate(claim.held):
+            table.ranges[f"e{k}"] = symmetric(error)
+        for i, row in enumerate(claim.rows):
+            self._name(row["state"], plus({f"Q{i}": ONE}, self._target(i)))
+        for i in self.gain:
+            self._control(i)
+        for k, (name, row) in enumerate(zip(claim.inputs, claim.drives, strict=True)):
+            self._name(name, plus(self._kappa(row), {f"e{k}": ONE}))
+
+    def _name(self, name: str, form: Form) -> None:
+        self.nodes[name] = Node(("input", name), form, self.table.over(form))
+
+    def _target(self, i: int) -> Form:
+        target = self.claim.rows[i]["target"]
+        if target == "reference":
+            return {"r0": ONE}
+        return {} if target == "zero" else self._kappa(target)
+
+    def _kappa(self, i: int) -> Form:
+        self._control(i)
+        return plus({f"K{i}": ONE}, self.model[i])
+
+    def _control(self, i: int) -> None:
+        """θ̂_i in [0, ε(R+N)²/(2σ)], the gain in [½β, ½B], the modelling term."""
+        if i in self.half:
+            return
+        gain, noise = self.gain[i], self._noise(i)
+        peak = (self.claim.radii[i] + noise) ** 2
+        theta = up(gain.epsilon[1] * peak / (2 * gain.sigma[0]))
+        drive = max(gain.delta[1] * gain.sigma[1] * theta, gain.epsilon[1] * gain.delta[1] * peak / 2)
+        self.theta[i], self.theta_rate[i] = theta, up(drive)
+        self.half[i] = down(gain.beta[0] / 2), up((gain.beta[1] + gain.epsilon[1] * theta) / 2)
+        self.table.definitions[f"K{i}"] = {f"Q{i}": neg(self.half[i])}
+        self.table.ranges[f"K{i}"] = self.table.over(self.table.definitions[f"K{i}"])
+        need(reads(self.term[i]) <= set(self.nodes), "a modelling term reads a state that comes later")
+        self.model[i] = linear(self.term[i], self.nodes, self.table)[0].form
+
+    def _noise(self, i: int) -> Fraction:
+        target, own = self.claim.rows[i]["target"], self.claim.noise[i]
+        upstream = Fraction(0) if isinstance(target, str) else self._control_noise(target)
+        self.noise[i] = own + upstream
+        return self.noise[i]
+
+    def _control_noise(self, i: int) -> Fraction:
+        """What measurement errors make of κ_i."""
+        shaken = {r["state"]: {"": symmetric(n)} for r, n in zip(self.claim.rows, self.claim.noise, strict=True)}
+        direct = magnitude(derivative(self.term[i], self._ranges(), shaken).get("", ZERO))
+        return up(self.half[i][1] * self.noise[i] + direct)
+
+    def _ranges(self) -> dict[str, Interval]:
+        ranges = {name: node.range for name, node in self.nodes.items()}
+        for row, noise in zip(self.claim.rows, self.claim.noise, strict=True):
+            if row["state"] in ranges:
+                ranges[row["state"]] = add(ranges[row["state"]], symmetric(noise))
+        return ranges
+
+    def _rows(self) -> None:
+        claim, table, n = self.claim, self.table, len(self.claim.rows)
+        values = linear(claim.plant, self.nodes, table)
+        self.mass = [value.range for value in values[:n]]
+        if min(mass[0] for mass in self.mass) <= 0:
+            raise NotProved("an inertia can vanish inside the assumptions")
+        forces = [table.expand(value.form, keep="K") for value in values[n:]]
+        moving = {r["state"]: times(f, inverse(m)) for r, f, m in zip(claim.rows, forces, self.mass, strict=True)}
+        moving |= {f"r{k}": {f"r{k + 1}": ONE} for k in range(3)}
+        self.open: list[Form] = []
+        for i, row in enumerate(claim.rows):
+            rate = {"r1": ONE} if row["target"] == "reference" else {}
+            rate = self.virtual[row["target"]] if isinstance(row["target"], int) else rate
+            self.open.append(plus(forces[i], times(rate, neg(self.mass[i]))))
+            if i in self.gain:
+                self.virtual[i] = self._virtual_rate(i, moving)
+        self.closed = [table.expand(form) for form in self.open]
+        self.disturbance = [magnitude(table.over({s: c for s, c in f.items() if s[:1] != "Q"})) for f in self.closed]
+
+    def _virtual_rate(self, i: int, moving: dict[str, Form]) -> Form:
+        """κ_i' = -½(β + εθ̂) Q_i' - ½ε θ̂' Q_i + m_i'."""
+        error_rate = times(self.open[i], inverse(self.mass[i]))
+        adapting = symmetric(up(self.gain[i].epsilon[1] * self.theta_rate[i] / 2))
+        term_rate = self.table.expand(derivative(self.term[i], self._ranges(), moving), keep="K")
+        return plus(times(error_rate, neg(self.half[i])), {f"Q{i}": adapting}, term_rate)
+
+    def entry(self, i: int, j: int) -> Interval:
+        """S_ij."""
+        return self.closed[i].get(f"Q{j}", ZERO)
+
+    def own_gain(self, i: int) -> Fraction:
+        """The smallest effect of the own virtual control."""
+        return self.open[i].get(f"K{i}", ZERO)[0]
+
+    def held_error(self, k: int) -> Fraction:
+        """T_s sup|κ'| plus what noise adds: bounds |u_k - κ_k(t)| within a period."""
+        row = self.claim.drives[k]
+        speed = magnitude(self.table.over(self.table.expand(self.virtual[row])))
+        return self.claim.period * speed + self._control_noise(row)
+
+    def signal(self, name: str) -> Fraction:
+        """Bound on |input| as commanded, or on |state|."""
+        if name not in self.claim.inputs:
+            return magnitude(self.nodes[name].range)
+        row = self.claim.drives[self.claim.inputs.index(name)]
+        return magnitude(self.table.over(self._kappa(row))) + self._control_noise(row)
+
+    def adaptation_residual(self, i: int) -> Fraction:
+        """What sampling and noise add to θ̂' in the Lyapunov function."""
+        gain, period = self.gain[i], self.claim.period
+        error = period * magnitude(self.table.over(self.closed[i])) / self.mass[i][0] + self.noise[i]
+        squares = gain.epsilon[1] * gain.delta[1] * error * (2 * self.claim.radii[i] + error) / 2
+        return up(gain.delta[1] * gain.sigma[1] * period * self.theta_rate[i] + squares)
+
+
+# --- the obligations ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Obligation:
+    """One verdict."""
+
+    name: str
+    statement: str
+    margin: float
+    unit: str
+    verdict: str
+
+
+def positive_definite(matrix: list[list[Fraction]]) -> bool:
+    """Strict definiteness of a symmetric rational matrix by exact LDLᵀ."""
+    rest = [list(row) for row in matrix]
+    while rest:
+        pivot = rest[0][0]
+        if pivot <= 0:
+            return False
+        head = rest[0]
+        rest = [[row[j] - row[0] * head[j] / pivot for j in range(1, len(row))] for row in rest[1:]]
+    return True
+
+
+def conditions_hold(claim: Claim, loop: Loop, spare: Fraction) -> bool:
+    """P - (μ/2 + spare/2) diag(w M) positive definite at every sign vertex (Rohn 1994)."""
+    n, w = len(claim.rows), claim.weights
+    middle = [[Fraction(0)] * n for _ in range(n)]
+    radius = [[Fraction(0)] * n for _ in range(n)]
+    for i in range(n):
+        adapted = loop.own_gain(i) * w[i] * claim.leak[i] / 2 if i in loop.gain and claim.leak[i] > 0 else Fraction(0)
+        decay = (claim.decay + spare) / 2 * w[i] * loop.mass[i][1]
+        middle[i][i] = down(-w[i] * loop.entry(i, i)[1] + adapted - w[i] * claim.young[i] / 2 - decay)
+        for j in range(i):
+            a, b = loop.entry(i, j), loop.entry(j, i)
+            low, high = down(-(w[i] * a[1] + w[j] * b[1]) / 2), up(-(w[i] * a[0] + w[j] * b[0]) / 2)
+            middle[i][j] = middle[j][i] = (low + high) / 2
+            radius[i][j] = radius[j][i] = (high - low) / 2
+    for signs in product((1, -1), repeat=n - 1):
+        z = (1, *signs)
+        if not positive_definite([[middle[i][j] - z[i] * z[j] * radius[i][j] for j in range(n)] for i in range(n)]):
+            return False
+    return True
+
+
+def level(claim: Claim, loop: Loop) -> Fraction:
+    """c/μ."""
+    total = Fraction(0)
+    for i, w in enumerate(claim.weights):
+        total += w * loop.disturbance[i] ** 2 / (2 * claim.young[i])
+        if claim.leak[i] > 0:
+            gain = loop.gain[i]
+            star = claim.leak[i] / gain.epsilon[0]
+            leaked = gain.sigma[1] * star**2 / 2
+            residual = max(loop.theta[i], star) * loop.adaptation_residual(i) / gain.delta[0]
+            total += w * loop.own_gain(i) * (leaked + residual)
+    return up(total / claim.decay)
+
+
+def start(claim: Claim, loop: Loop) -> Fraction:
+    """The largest V over the initial errors, θ̂(0) = 0."""
+    total = Fraction(0)
+    for i, w in enumerate(claim.weights):
+        total += w * loop.mass[i][1] * claim.initial[i] ** 2 / 2
+        if claim.leak[i] > 0:
+            star = claim.leak[i] / loop.gain[i].epsilon[0]
+            total += w * loop.own_gain(i) * star**2 / (2 * loop.gain[i].delta[0])
+    return up(total)
+
+
+def spare_decay(claim: Claim, loop: Loop) -> Fraction:
+    """By how much μ could grow before the conditions fail, to a part in 64; negative where they fail already."""
+    if not conditions_hold(claim, loop, Fraction(0)):
+        return -claim.decay
+    low, high = Fraction(0), claim.decay
+    for _ in range(6):
+        trial = (low + high) / 2
+        low, high = (trial, high) if conditions_hold(claim, loop, trial) else (low, trial)
+    return low
+
+
+def invariance(claim: Claim, loop: Loop) -> Fraction:
+    """The smallest share by which a side of the box exceeds what can be reached; negative where it can be left."""
+    top = max(level(claim, loop), start(claim, loop))
+    worst: Fraction | None = None
+    for i, radius in enumerate(claim.radii):
+        by_energy = root(up(2 * top / (claim.weights[i] * loop.mass[i][0])), True)
+        pull = -loop.entry(i, i)[1]
+        push = loop.disturbance[i]
+        push += sum(magnitude(loop.entry(i, j)) * claim.radii[j] for j in range(len(claim.radii)) if j != i)
+        by_row = max(push / pull, claim.initial[i]) if pull > 0 else by_energy
+        spare = 1 - min(by_energy, by_row) / radius
+        worst = spare if worst is None else min(worst, spare)
+    return worst if worst is not None else Fraction(-1)
+
+
+def ball(claim: Claim, loop: Loop, i: int) -> Fraction:
+    """Certified ultimate bound on |Q_i|."""
+    energy = root(up(2 * level(claim, loop) / (claim.weights[i] * loop.mass[i][0])), True)
+    return min(energy, claim.radii[i])
+
+
+def holds(claim: Claim, inflate: Fraction) -> bool:
+    """All obligations that depend on the gains, for every gain within a relative distance."""
+    try:
+        loop = Loop(claim, inflate)
+        return (
+            conditions_hold(claim, loop, Fraction(0))
+            and invariance(claim, loop) > 0
+            and all(slack > 0 for slack, _, _ in authority(claim, loop))
+            and all(loop.held_error(k) < claim.held[k] for k in range(len(claim.held)))
+            and adaptation(claim, loop) >= 0
+            and ball(claim, loop, 0) <= claim.accuracy
+        )
+    except NotProved:
+        return False
+
+
+def authority(claim: Claim, loop: Loop) -> list[tuple[Fraction, str, str]]:
+    """Distance of each limited norm from its limit over the certified set; then the stroke."""
+    result = []
+    for limit in claim.limits:
+        norm = root(up(sum((loop.signal(s) ** 2 for s in limit["signals"]), Fraction(0))), True)
+        result.append((limit["value"] - norm, str(limit["unit"]), str(limit["name"])))
+    position = loop.nodes[claim.rows[0]["state"]].range
+    result.append((min(position[0] - claim.stroke[0], claim.stroke[1] - position[1]), "m", "stroke"))
+    return result
+
+
+def adaptation(claim: Claim, loop: Loop) -> Fraction:
+    """1 - T_s δσ keeps sampled θ̂ >= 0; δσ >= μ wherever θ̂ is part of V."""
+    slack = Fraction(1)
+    for i, gain in loop.gain.items():
+        slack = min(slack, 1 - claim.period * gain.delta[1] * gain.sigma[1])
+        if claim.leak[i] > 0:
+            slack = min(slack, gain.delta[0] * gain.sigma[0] / claim.decay - 1)
+    return slack
+
+
+def vacuity(claim: Claim) -> Fraction:
+    """The smallest ratio of what must be inside to what holds it, turned into a margin."""
+    positive = [claim.decay, claim.period, claim.accuracy, *claim.weights, *claim.young, *claim.radii]
+    positive += [limit["value"] for limit in claim.limits] + [claim.stroke[1] - claim.stroke[0]]
+    if min(positive) <= 0 or min(claim.leak + claim.held + claim.noise + claim.initial) < 0:
+        return Fraction(-1)
+    return min(1 - initial / radius for initial, radius in zip(claim.initial, claim.radii, strict=True))
+
+
+def obligations(claim: Claim) -> list[Obligation]:
+    """Decide every obligation of the law."""
+    made: list[Obligation] = []
+
+    def state(name: str, statement: str, margin: Fraction, unit: str, strict: bool = True) -> None:
+        good = margin > 0 or (margin == 0 and not strict)
+        made.append(Obligation(name, statement, float(margin), unit, "proved" if good else "undecided"))
+
+    state("non-vacuity", "the box is not empty, holds the initial errors, and no limit is zero", vacuity(claim), "1")
+    if made[0].verdict != "proved":
+        raise NotProved("the certificate is about an empty set (obligation non-vacuity)")
+    loop = Loop(claim, ROUNDING)
+    span = claim.reference[0]
+    inside = min(span[0] - claim.stroke[0], claim.stroke[1] - span[1])
+    state("reference", "the reference is continuous to its acceleration, ends at rest and stays inside the stroke", inside, "m")
+    state("composition", f"P - (mu/2) diag(w M) > 0 at every vertex, mu = {float(claim.decay):.4g} 1/s", spare_decay(claim, loop), "1/s", False)
+    state("invariance", "no trajectory from the initial set leaves the box |Q_i| <= R_i", invariance(claim, loop), "1")
+    slack, unit, which = min(authority(claim, loop), key=lambda entry: entry[0] / scale(claim, entry[2]))
+    state("authority", f"every limit holds over the certified set; the tightest is {which}", slack, unit)
+    spare = min(1 - loop.held_error(k) / h if h > 0 else -loop.held_error(k) for k, h in enumerate(claim.held))
+    state("sampling", f"held inputs stay within the assumed error of the continuous law at {float(1 / claim.period):g} Hz", spare, "1")
+    state("adaptation", "sampled adaptation keeps theta >= 0, and delta sigma >= mu where theta is in V", adaptation(claim, loop), "1", False)
+    steps = [step for step in (Fraction(1, 1000), Fraction(1, 10000), ROUNDING) if holds(claim, step)]
+    state("rounding", "everything holds for the gains as decimal, float64 and float32", (steps or [Fraction(-1)])[0], "1")
+    error = ball(claim, loop, 0)
+    state("accuracy", f"after the transient the tracking error is at most {float(error) * 1e3:.4g} mm", claim.accuracy - error, "m", False)
+    for i, stated in enumerate(claim.ball):
+        if stated < ball(claim, loop, i):
+            raise NotProved(f"the envelope states a smaller bound on Q_{i + 1} than can be proved")
+    return made
+
+
+def scale(claim: Claim, name: str) -> Fraction:
+    """The size of a limit, to compare margins of different units."""
+    return next((limit["value"] for limit in claim.limits if limit["name"] == name), claim.stroke[1] - claim.stroke[0])
+
+
+# --- golden vectors and recorded validation -----------------------------------------------------------------------
+
+
+def golden_agree(data: dict[str, Any], claim: Claim) -> bool:
+    """The recorded input/output vectors follow from the gains and the law, to float accuracy."""
+    vectors = data["golden"]["vectors"]
+    need(isinstance(vectors, list) and 20 <= len(vectors) <= 100, "golden must hold 20 to 100 vectors")
+    return all(_golden_one(vector, claim) for vector in vectors)
+
+
+def _golden_one(vector: dict[str, Any], claim: Claim) -> bool:
+    n, k = len(claim.rows), len(claim.governed)
+    x, r, theta = (
+        [float(v) for v in numbers(vector[key], count, "golden")] for key, count in (("x", n), ("r", 4), ("theta", k))
+    )
+    named = {row["state"]: value for row, value in zip(claim.rows, x, strict=True)}
+    named |= {f"r{j}": value for j, value in enumerate(r)}
+    named |= {f"nominal.{name}": float(value) for name, value in claim.nominal.items()}
+    virtual: dict[int, float] = {}
+    following: list[float] = []
+    for j, i in enumerate(claim.governed):
+        target = claim.rows[i]["target"]
+        goal = r[0] if target == "reference" else 0.0 if target == "zero" else virtual[target]
+        beta, epsilon, delta, sigma = (float(g) for g in claim.gains[j])
+        error, program = x[i] - goal, claim.law[j]
+        term = walk(program, named.__getitem__, float, float_apply)[program["outputs"][0]]
+        virtual[i] = -(beta + epsilon * theta[j]) * error / 2 + term
+        step = epsilon * delta * error * error / 2 - delta * sigma * theta[j]
+        following.append(theta[j] + float(claim.period) * step)
+    wanted = [virtual[row] for row in claim.drives]
+    norm, limit = math.hypot(*wanted), float(claim.limits[0]["value"])
+    wanted = [value * (limit / max(norm, limit)) for value in wanted]
+    pairs = list(zip(wanted, numbers(vector["u"], len(wanted), "golden"), strict=True))
+    pairs += zip(following, numbers(vector["theta_next"], k, "golden"), strict=True)
+    return all(abs(a - float(b)) <= 1e-8 * (1.0 + abs(a)) for a, b in pairs)
+
+
+def float_apply(operator: str, a: float, b: float = 0.0) -> float:
+    """Operations in floats."""
+    simple = {"add": a + b, "sub": a - b, "mul": a * b, "neg": -a, "sq": a * a}
+    if operator in simple:
+        return simple[operator]
+    return a / b if operator == "div" else math.tanh(a) if operator == "tanh" else math.sqrt(a)
+
+
+# --- the command ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Report:
+    """The verdict on one file."""
+
+    file: str
+    status: int
+    message: str
+    obligations: list[Obligation] = field(default_factory=list)
+
+
+def check_text(text: str, file: str = "") -> Report:
+    """Re-prove a gain file given as text.
+
+    Returns:
+        Status 0 proved, 1 not proved, 2 unreadable; with one line and the obligations.
+    """
+    try:
+        data = parse(text)
+        need(data.get("schema") == SCHEMA, wrong_schema(data.get("schema")))
+        check_digests(text)
+        claim = read(data)
+        recorded = [entry["name"] for entry in data["obligations"]]
+        made = obligations(claim)
+        agree = golden_agree(data, claim)
+        seen = number(data["validation"]["largest_error_m"], "largest_error_m")
+    except Unreadable as error:
+        return Report(file, 2, f"unreadable: {error}")
+    except NotProved as error:
+        return Report(file, 1, f"not proved: {error}")
+    except (KeyError, TypeError, AttributeError, IndexError, ValueError, ZeroDivisionError, OverflowError) as error:
+        return Report(file, 2, f"unreadable: a part of the gain file is missing or malformed: {error!r:.120}")
+    missing = [name for name in REQUIRED[data["controller"]["law"]] if recorded.count(name) != 1]
+    if missing:
+        return Report(file, 1, f"not proved: the file leaves out the obligation {missing[0]}", made)
+    failed = [o for o in made if o.verdict != "proved"]
+    if failed:
+        return Report(file, 1, f"not proved: {failed[0].name} (margin {failed[0].margin:.4g} {failed[0].unit})", made)
+    if not agree:
+        return Report(file, 1, "not proved: the golden vectors do not follow from the gains and the law", made)
+    if seen > claim.radii[0]:
+        return Report(file, 1, "not proved: the recorded simulation leaves the certified envelope", made)
+    return Report(file, 0, f"proved: |tracking error| <= {float(claim.ball[0]) * 1e3:.4g} mm after the transient", made)
+
+
+def check_file(path: Path) -> Report:
+    """Re-prove one file."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            return Report(str(path), 2, f"unreadable: a gain file has at most {MAX_BYTES} bytes")
+        return check_text(path.read_text(encoding="utf-8"), str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        return Report(str(path), 2, f"unreadable: {error}")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Check files; print one verdict a file and one line an obligation."""
+    parser = argparse.ArgumentParser(description="Re-prove gain files from the files alone.")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
+    parser.add_argument("--json", action="store_true", help="print the verdicts as JSON")
+    options = parser.parse_args(arguments)
+    reports = [check_file(path) for path in options.files]
+    if options.json:
+        rows = [{**r.__dict__, "obligations": [o.__dict__ for o in r.obligations]} for r in reports]
+        print(json.dumps(rows, indent=1))
+    else:
+        for report in reports:
+            print(f"{report.file}: {report.message}")
+            for o in report.obligations:
+                print(f"  {o.verdict:9} {o.name:12} margin {o.margin:.4g} {o.unit}: {o.statement}")
+    return max(report.status for report in reports)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

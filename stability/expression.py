@@ -1,0 +1,190 @@
+"""Expressions as data: a CasADi SX function turned into a list of operations that a file can carry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from .interval import Interval
+
+T = TypeVar("T")
+
+UNARY = ("neg", "sq", "sqrt", "tanh")
+BINARY = ("add", "sub", "mul", "div")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expression:
+    """A straight-line program.
+
+    Attributes:
+        inputs: Names of the scalar inputs that occur.
+        operations: Each entry is ("input", name), ("const", decimal text) or (operator, index…), where an index
+            points to an earlier entry.
+        outputs: Indices of the entries that are results.
+    """
+
+    inputs: tuple[str, ...]
+    operations: tuple[tuple[Any, ...], ...]
+    outputs: tuple[int, ...]
+
+    def to_data(self) -> dict[str, Any]:
+        """The expression as JSON data."""
+        return {
+            "inputs": list(self.inputs),
+            "operations": [list(operation) for operation in self.operations],
+            "outputs": list(self.outputs),
+        }
+
+    def __call__(self, values: Mapping[str, float]) -> list[float]:
+        """Evaluate in floats.
+
+        Args:
+            values: One number for each input name.
+
+        Returns:
+            The outputs, in order.
+        """
+        table = run(self, lambda name: float(values[name]), _FLOAT, float)
+        return [table[index] for index in self.outputs]
+
+
+def enclose(expression: Expression, ranges: Mapping[str, Interval]) -> list[Interval]:
+    """Enclosures of the outputs over ranges of the inputs, by natural interval evaluation.
+
+    Raises:
+        ZeroDivisionError: a divisor can vanish in the ranges.
+    """
+    table = run(expression, ranges.__getitem__, _INTERVAL, Interval)
+    return [table[index] for index in expression.outputs]
+
+
+_INTERVAL: dict[str, Callable[..., Interval]] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "neg": lambda a: -a,
+    "sq": Interval.square,
+    "sqrt": Interval.sqrt,
+    "tanh": Interval.tanh,
+}
+
+_FLOAT: dict[str, Callable[..., float]] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "neg": lambda a: -a,
+    "sq": lambda a: a * a,
+    "sqrt": math.sqrt,
+    "tanh": math.tanh,
+}
+
+
+def run(
+    expression: Expression, read: Callable[[str], T], operators: Mapping[str, Callable[..., T]], const: Callable[..., T]
+) -> list[T]:
+    """Run the program in any arithmetic; returns the value of every entry."""
+    table: list[T] = []
+    for operator, *arguments in expression.operations:
+        if operator == "input":
+            table.append(read(arguments[0]))
+        elif operator == "const":
+            table.append(const(float(arguments[0])))
+        else:
+            table.append(operators[operator](*(table[index] for index in arguments)))
+    return table
+
+
+def from_casadi(function: Any, names: tuple[str, ...]) -> Expression:
+    """Read the instruction list of a CasADi SX function.
+
+    Args:
+        function: A `casadi.Function` over SX with one column vector as its single input and one as its output.
+        names: A name for each element of the input.
+
+    Returns:
+        The same function as data, common subexpressions shared.
+
+    Raises:
+        NotImplementedError: an instruction that the prover cannot bound; the message names it.
+        ValueError: the number of names does not match the input.
+    """
+    import casadi as ca
+
+    if function.n_in() != 1 or function.n_out() != 1 or function.numel_in(0) != len(names):
+        raise ValueError(f"one input vector with {len(names)} named elements is needed: got {function}")
+    known = _casadi_operators(ca)
+    builder = _Builder()
+    work: dict[int, int] = {}
+    results: dict[int, int] = {}
+    for k in range(function.n_instructions()):
+        code = function.instruction_id(k)
+        sources, targets = function.instruction_input(k), function.instruction_output(k)
+        if code == ca.OP_INPUT:
+            work[targets[0]] = builder.add("input", names[sources[1]])
+        elif code == ca.OP_CONST:
+            work[targets[0]] = builder.const(function.instruction_constant(k))
+        elif code == ca.OP_OUTPUT:
+            results[targets[1]] = work[sources[0]]
+        elif code in known:
+            work[targets[0]] = known[code](builder, *(work[i] for i in sources))
+        else:
+            raise NotImplementedError(
+                f"the prover bounds + - * / square sqrt tanh: CasADi instruction {code} came in {function.name()}; "
+                "rewrite the model with those"
+            )
+    outputs = tuple(results[i] if i in results else builder.const(0.0) for i in range(function.numel_out(0)))
+    return _pruned(builder.operations, outputs)
+
+
+def _pruned(operations: list[tuple[Any, ...]], outputs: tuple[int, ...]) -> Expression:
+    """Only the operations that an output needs, in order."""
+    needed = set(outputs)
+    for index in reversed(range(len(operations))):
+        operator, *arguments = operations[index]
+        if index in needed and operator not in ("input", "const"):
+            needed.update(arguments)
+    moved = {old: new for new, old in enumerate(sorted(needed))}
+    kept = []
+    for old in sorted(needed):
+        operator, *arguments = operations[old]
+        kept.append((operator, *(arguments if operator in ("input", "const") else (moved[a] for a in arguments))))
+    used = tuple(operation[1] for operation in kept if operation[0] == "input")
+    return Expression(inputs=used, operations=tuple(kept), outputs=tuple(moved[o] for o in outputs))
+
+
+def _casadi_operators(ca: Any) -> dict[int, Callable[..., int]]:
+    return {
+        ca.OP_ADD: lambda b, i, j: b.add("add", i, j),
+        ca.OP_SUB: lambda b, i, j: b.add("sub", i, j),
+        ca.OP_MUL: lambda b, i, j: b.add("mul", i, j),
+        ca.OP_DIV: lambda b, i, j: b.add("div", i, j),
+        ca.OP_NEG: lambda b, i: b.add("neg", i),
+        ca.OP_SQ: lambda b, i: b.add("sq", i),
+        ca.OP_SQRT: lambda b, i: b.add("sqrt", i),
+        ca.OP_TANH: lambda b, i: b.add("tanh", i),
+        ca.OP_TWICE: lambda b, i: b.add("mul", b.const(2.0), i),
+        ca.OP_INV: lambda b, i: b.add("div", b.const(1.0), i),
+        ca.OP_ASSIGN: lambda b, i: i,
+    }
+
+
+class _Builder:
+    """Collects operations and gives equal ones the same index."""
+
+    def __init__(self) -> None:
+        self.operations: list[tuple[Any, ...]] = []
+        self._index: dict[tuple[Any, ...], int] = {}
+
+    def add(self, *operation: Any) -> int:
+        if operation not in self._index:
+            self._index[operation] = len(self.operations)
+            self.operations.append(operation)
+        return self._index[operation]
+
+    def const(self, value: float) -> int:
+        return self.add("const", repr(float(value)))

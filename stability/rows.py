@@ -1,0 +1,236 @@
+"""The closed loop in error coordinates: M_i Q_i' = sum_j S_ij Q_j + d_i with everything enclosed in intervals.
+
+Theory §3, with the couplings a, the unsigned bounds L and the gains g gathered in one interval matrix S, and each row
+multiplied by its constant unknown inertia M_i, which then enters only between V and |Q_i|.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .form import ONE, Form, Symbols, Value, evaluate, tangent
+from .interval import Interval
+from .model import Bounds, Gains, LoopModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorRows:
+    """Enclosures that hold while |Q_i| <= radii_i and the input differs from its virtual control by at most `held`.
+
+    Attributes:
+        low: Lower ends of S. Shape (n, n).
+        high: Upper ends of S. Shape (n, n).
+        disturbance: Bounds D_i on |d_i|. Shape (n,).
+        mass_low: Lower ends of M. Shape (n,).
+        mass_high: Upper ends of M. Shape (n,).
+        control_gain: Lower ends of g_i, the effect of the own virtual control (0 where a row has none). Shape (n,).
+        theta_max: Bounds on the adaptive scalars. Shape (n,).
+        theta_residual: Bounds on what sampling and noise add to the adaptation. Shape (n,).
+        held: What the sampling and the noise make of the input error. Shape (m,).
+        effort: Bounds on the inputs |u_k|. Shape (m,).
+        states: Bounds on |x_i|. Shape (n,).
+    """
+
+    low: Array
+    high: Array
+    disturbance: Array
+    mass_low: Array
+    mass_high: Array
+    control_gain: Array
+    theta_max: Array
+    theta_residual: Array
+    held: Array
+    effort: Array
+    states: Array
+
+
+def error_rows(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], radii: Array, held: Array) -> ErrorRows:
+    """Enclose the closed loop over the box |Q_i| <= radii_i.
+
+    Args:
+        model: Plant and law.
+        bounds: Assumptions.
+        gains: One for each governed row, in order.
+        radii: Half widths of the box, in the units of the states. Shape (n,).
+        held: Assumed bounds on |u_k - κ_k(t)|. Shape (m,).
+
+    Returns:
+        The enclosures.
+
+    Raises:
+        ZeroDivisionError: a divisor of the model can vanish in the box.
+
+    Not guaranteed: that the box is invariant, or that `held` is large enough. The caller checks both.
+    """
+    return _Builder(model, bounds, gains, radii, held).build()
+
+
+class _Builder:
+    """One pass over the rows, in the order in which they track each other."""
+
+    def __init__(self, model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], radii: Array, held: Array) -> None:
+        self.model, self.bounds, self.radii = model, bounds, [float(r) for r in radii]
+        self.gains = dict(zip(model.governed, gains, strict=True))
+        self.terms = dict(zip(model.governed, model.law, strict=True))
+        self.symbols = Symbols()
+        for k, interval in enumerate(bounds.reference):
+            self.symbols.ranges[f"r{k}"] = interval
+        for i, radius in enumerate(self.radii):
+            self.symbols.ranges[f"Q{i}"] = Interval.symmetric(radius)
+        for k, error in enumerate(held):
+            self.symbols.ranges[f"e{k}"] = Interval.symmetric(float(error))
+        self.inputs: dict[str, Value] = {}
+        for name, number in bounds.nominal.items():
+            self.inputs[f"nominal.{name}"] = self.symbols.constant(Interval(number), name)
+        for name, interval in {**bounds.parameters, **bounds.disturbances}.items():
+            self.inputs[name] = self.symbols.constant(interval, name)
+        for k in range(4):
+            self.inputs[f"r{k}"] = self.symbols.value(f"r{k}", Form.of(f"r{k}"))
+        self.noise: dict[int, float] = {}
+        self.theta_max: dict[int, float] = {}
+        self.theta_rate: dict[int, float] = {}
+        self.half_gain: dict[int, Interval] = {}
+        self.model_term: dict[int, Form] = {}
+
+    def build(self) -> ErrorRows:
+        n = len(self.model.rows)
+        self._states()
+        values = self._plant()
+        masses = [values[i].range for i in range(n)]
+        forces = [self.symbols.expand(values[n + i].form, keep="K") for i in range(n)]
+        rates = [forces[i].scaled(ONE / masses[i]) for i in range(n)]
+        rows, virtual_rates = self._rows(forces, masses, rates)
+        closed = [self.symbols.expand(row) for row in rows]
+        own = [rows[i].coefficient(f"K{i}").low if i in self.gains else 0.0 for i in range(n)]
+        held = [self._held(row, virtual_rates[row]) for row in self.model.drives]
+        return ErrorRows(
+            low=np.array([[c.coefficient(f"Q{j}").low for j in range(n)] for c in closed]),
+            high=np.array([[c.coefficient(f"Q{j}").high for j in range(n)] for c in closed]),
+            disturbance=np.array([self._disturbance(c) for c in closed]),
+            mass_low=np.array([m.low for m in masses]),
+            mass_high=np.array([m.high for m in masses]),
+            control_gain=np.array(own),
+            theta_max=np.array([self.theta_max.get(i, 0.0) for i in range(n)]),
+            theta_residual=np.array([self._residual(i, closed[i], masses[i]) for i in range(n)]),
+            held=np.array(held),
+            effort=np.array([self._effort(row) for row in self.model.drives]),
+            states=np.array([self.inputs[row.state].range.magnitude for row in self.model.rows]),
+        )
+
+    def _states(self) -> None:
+        """Forms of the states, row by row: x_i = target_i + Q_i; and of the modelling terms once their inputs exist."""
+        for i, row in enumerate(self.model.rows):
+            form = Form.of(f"Q{i}") + self._target(i)
+            self.inputs[row.state] = self.symbols.value(row.state, form)
+        for i in self.gains:
+            self._virtual_control(i)
+
+    def _target(self, i: int) -> Form:
+        target = self.model.rows[i].target
+        if target == "reference":
+            return Form.of("r0")
+        if target == "zero":
+            return Form()
+        self._virtual_control(int(target))
+        return Form.of(f"K{target}") + self.model_term[int(target)]
+
+    def _virtual_control(self, i: int) -> None:
+        """Bounds on θ̂_i, the gain interval [½β, ½B], the symbol K_i and the modelling term m_i."""
+        if i in self.half_gain:
+            return
+        gains, radius = self.gains[i], self.radii[i]
+        noise = self._noise(i)
+        peak = (radius + noise) ** 2
+        theta = gains.epsilon * peak / (2.0 * gains.sigma) * (1 + 1e-12)
+        rate = max(gains.delta * gains.sigma * theta, 0.5 * gains.epsilon * gains.delta * peak) * (1 + 1e-12)
+        half = Interval(0.5) * Interval(gains.beta, gains.beta + gains.epsilon * theta * (1 + 1e-12))
+        self.theta_max[i], self.theta_rate[i], self.half_gain[i] = theta, rate, half
+        definition = Form({f"Q{i}": -half})
+        self.symbols.definitions[f"K{i}"] = definition
+        self.symbols.ranges[f"K{i}"] = self.symbols.range_of(definition)
+        self.model_term[i] = evaluate(self.terms[i], self.inputs, self.symbols)[0].form
+
+    def _noise(self, i: int) -> float:
+        """Bound on the error of the Q_i that the controller computes."""
+        target = self.model.rows[i].target
+        own = self.bounds.noise[i]
+        if isinstance(target, str):
+            self.noise[i] = own
+            return own
+        upstream = self.half_gain[target].high * self.noise[target] + self._term_noise(target)
+        self.noise[i] = (own + upstream) * (1 + 1e-12)
+        return self.noise[i]
+
+    def _ranges(self) -> dict[str, Interval]:
+        """Input ranges of the law, widened by the measurement noise."""
+        ranges = {name: value.range for name, value in self.inputs.items()}
+        for row, noise in zip(self.model.rows, self.bounds.noise, strict=True):
+            if row.state in ranges:
+                ranges[row.state] = ranges[row.state] + Interval.symmetric(noise)
+        return ranges
+
+    def _term_noise(self, i: int) -> float:
+        tangents = {
+            row.state: Form(constant=Interval.symmetric(noise))
+            for row, noise in zip(self.model.rows, self.bounds.noise, strict=True)
+        }
+        return tangent(self.terms[i], self._ranges(), tangents).constant.magnitude
+
+    def _plant(self) -> list[Value]:
+        for k, (name, row) in enumerate(zip(self.model.inputs, self.model.drives, strict=True)):
+            form = Form.of(f"K{row}") + self.model_term[row] + Form.of(f"e{k}")
+            self.inputs[name] = self.symbols.value(name, form)
+        return evaluate(self.model.plant, self.inputs, self.symbols)
+
+    def _rows(
+        self, forces: list[Form], masses: list[Interval], rates: list[Form]
+    ) -> tuple[list[Form], dict[int, Form]]:
+        tangents = {row.state: rates[i] for i, row in enumerate(self.model.rows)}
+        tangents.update({f"r{k}": Form.of(f"r{k + 1}") for k in range(3)})
+        ranges = self._ranges()
+        rows: list[Form] = []
+        virtual: dict[int, Form] = {}
+        for i, row in enumerate(self.model.rows):
+            target_rate = Form.of("r1") if row.target == "reference" else Form()
+            if isinstance(row.target, int):
+                target_rate = virtual[row.target]
+            rows.append(forces[i] - target_rate.scaled(masses[i]))
+            if i in self.gains:
+                term_rate = self.symbols.expand(tangent(self.terms[i], ranges, tangents), keep="K")
+                error_rate = rows[i].scaled(ONE / masses[i])
+                virtual[i] = self._virtual_rate(i, error_rate) + term_rate
+        return rows, virtual
+
+    def _virtual_rate(self, i: int, error_rate: Form) -> Form:
+        adaptation = Interval.symmetric(0.5 * self.gains[i].epsilon * self.theta_rate[i] * (1 + 1e-12))
+        return error_rate.scaled(-self.half_gain[i]) + Form({f"Q{i}": adaptation})
+
+    def _held(self, row: int, virtual_rate: Form) -> float:
+        """T_s sup|κ'| plus the noise that reaches the input."""
+        sup = self.symbols.range_of(self.symbols.expand(virtual_rate)).magnitude
+        noise = self.half_gain[row].high * self.noise[row] + self._term_noise(row)
+        return (self.bounds.period * sup + noise) * (1 + 1e-12)
+
+    def _effort(self, row: int) -> float:
+        noise = self.half_gain[row].high * self.noise[row] + self._term_noise(row)
+        form = Form.of(f"K{row}") + self.model_term[row]
+        return (self.symbols.range_of(form).magnitude + noise) * (1 + 1e-12)
+
+    def _disturbance(self, form: Form) -> float:
+        rest = {s: c for s, c in form.coefficients.items() if not s.startswith("Q")}
+        return self.symbols.range_of(Form(rest, form.constant)).magnitude
+
+    def _residual(self, i: int, row: Form, mass: Interval) -> float:
+        if i not in self.gains:
+            return 0.0
+        gains = self.gains[i]
+        speed = self.symbols.range_of(row).magnitude / mass.low
+        error = self.bounds.period * speed + self.noise[i]
+        squares = 0.5 * gains.epsilon * gains.delta * error * (2.0 * self.radii[i] + error)
+        return gains.delta * gains.sigma * self.bounds.period * self.theta_rate[i] + squares
+

@@ -1,0 +1,62 @@
+"""Where candidates are evaluated: in this process or in several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from types import TracebackType
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+_evaluate: Callable[[Any], Any] | None = None
+
+
+def _prepare(make: Callable[..., Callable[[Any], Any]], arguments: tuple[Any, ...]) -> None:
+    import signal
+
+    global _evaluate
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _evaluate = make(*arguments)
+
+
+def _call(item: Any) -> Any:
+    if _evaluate is None:
+        raise RuntimeError("the worker was not prepared")
+    return _evaluate(item)
+
+
+class Executor:
+    """Maps a pure function over items; the order and the values do not depend on the number of processes.
+
+    Args:
+        make: Importable function that returns the function to map; called once in each process.
+        arguments: Its arguments; they must pickle.
+        jobs: Number of processes; 1 runs here.
+    """
+
+    def __init__(self, make: Callable[..., Callable[[T], R]], arguments: tuple[Any, ...], jobs: int = 1) -> None:
+        self._local = make(*arguments) if jobs <= 1 else None
+        self._pool = None
+        if jobs > 1:
+            self._pool = ProcessPoolExecutor(
+                jobs, mp_context=get_context("spawn"), initializer=_prepare, initargs=(make, arguments)
+            )
+
+    def map(self, items: Sequence[T]) -> list[R]:
+        """Results in the order of the items."""
+        if self._pool is None:
+            assert self._local is not None
+            return [self._local(item) for item in items]
+        return list(self._pool.map(_call, items))
+
+    def __enter__(self) -> Executor:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(wait=kind is None, cancel_futures=True)
