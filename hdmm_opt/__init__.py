@@ -1,0 +1,1 @@
+"""hdmm-opt: optimization-centred design of controllers for heavy-duty mobile machines."""

@@ -16,11 +16,12 @@ from stability import Composition, Gains, checker
 from trajectories import Reference, Spline
 
 from .control import gain_columns
-from .errors import InvalidInput
+from .errors import InvalidInputError
 from .problem import KINDS, Problem, resolved
-from .simulation import Scenario
-from .validation import scenarios
+from .simulation import scenarios
 
+#: Schema of what a refused design leaves behind.
+REJECTED = "hdmm-opt/rejected/1"
 #: Significant digits of the certificate's rationals.
 DIGITS = 9
 GOLDEN_VECTORS = 24
@@ -33,7 +34,10 @@ _MEANING = {
 
 
 def build(
-    problem: Problem, gains: tuple[Gains, ...], found: Composition, validation: dict[str, Any],
+    problem: Problem,
+    gains: tuple[Gains, ...],
+    found: Composition,
+    validation: dict[str, Any],
     provenance: dict[str, Any],
 ) -> dict[str, Any]:
     """The document of a design, without its obligations and hashes; see `seal`."""  # fmt: skip
@@ -84,21 +88,21 @@ def write_text(path: Path, text: str) -> None:
     """Write a whole file or nothing: a temporary file in the same folder, then a rename.
 
     Raises:
-        InvalidInput: the place cannot be written.
+        InvalidInputError: the place cannot be written.
     """
     try:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     except OSError as error:
-        raise InvalidInput(f"{path}: cannot write there: {error.strerror}; choose a writable folder") from None
+        raise InvalidInputError(f"{path}: cannot write there: {error.strerror}; choose a writable folder") from None
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as stream:
             stream.write(text)
             stream.flush()
             os.fsync(stream.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
     except OSError as error:
-        raise InvalidInput(f"{path}: cannot write there: {error.strerror}; choose another name") from None
+        raise InvalidInputError(f"{path}: cannot write there: {error.strerror}; choose another name") from None
     finally:
         Path(temporary).unlink(missing_ok=True)
 
@@ -107,35 +111,36 @@ def check_writable(path: Path) -> None:
     """Refuse an output place before any work is done.
 
     Raises:
-        InvalidInput: the folder is missing or not writable, or the path is a folder.
+        InvalidInputError: the folder is missing or not writable, or the path is a folder.
     """
     if path.is_dir():
-        raise InvalidInput(f"{path}: is a folder; give a file name")
+        raise InvalidInputError(f"{path}: is a folder; give a file name")
     try:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     except OSError as error:
-        raise InvalidInput(f"{path}: cannot write there: {error.strerror}; choose a writable folder") from None
+        raise InvalidInputError(f"{path}: cannot write there: {error.strerror}; choose a writable folder") from None
     os.close(handle)
     Path(temporary).unlink()
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Read a gain file that matches its hashes and schema.
+    """Read a gain file, or what a refused design left behind, that matches its hashes and schema.
 
     Raises:
-        InvalidInput: one line on what is wrong with the file.
+        InvalidInputError: one line on what is wrong with the file.
     """
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
-        raise InvalidInput(f"{path}: cannot read the gain file: {reason}; check the path") from None
+        raise InvalidInputError(f"{path}: cannot read the gain file: {reason}; check the path") from None
     try:
         data = checker.parse(text)
-        checker.need(data.get("schema") == checker.SCHEMA, checker.wrong_schema(data.get("schema")))
-        checker.check_digests(text)
-    except checker.Unreadable as error:
-        raise InvalidInput(f"{path}: unreadable: {error}") from None
+        if data.get("schema") != REJECTED:
+            checker.need(data.get("schema") == checker.SCHEMA, checker.wrong_schema(data.get("schema")))
+            checker.check_digests(text)
+    except checker.UnreadableError as error:
+        raise InvalidInputError(f"{path}: unreadable: {error}") from None
     return json.loads(text)
 
 
@@ -173,8 +178,7 @@ def reference_data(reference: Reference) -> dict[str, Any]:
 
 def golden_vectors(problem: Problem, gains: tuple[Gains, ...]) -> list[dict[str, Any]]:
     """Inputs and outputs of one control period along the first scenario, so that a port can be tested."""
-    first: Scenario = scenarios(problem.study)[0]
-    trace = problem.loop.run(gains, problem.reference, first)
+    trace = problem.loop.run(gains, problem.reference, scenarios(problem.study)[0])
     law = problem.law.step_function(problem.bounds.period)
     nominal, load = list(problem.plant.values().values()), problem.loop.nominal_load
     vectors = []

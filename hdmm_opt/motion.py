@@ -10,7 +10,7 @@ import numpy as np
 
 from stability import Interval, enclose, from_casadi
 from trajectories import (
-    LimitViolated,
+    LimitViolatedError,
     MotionLimits,
     Reference,
     Spline,
@@ -23,7 +23,7 @@ from trajectories import (
     violations,
 )
 
-from .errors import InvalidInput
+from .errors import InvalidInputError
 from .plants import EFFORTS, Plant, effort
 from .study import Study
 
@@ -43,7 +43,7 @@ def build_reference(study: Study, plant: Plant) -> Reference:
         voltage (at nominal parameters and the largest load) by interval enclosure of every span.
 
     Raises:
-        InvalidInput: a move breaks a limit; the message names it and what would do.
+        InvalidInputError: a move breaks a limit; the message names it and what would do.
     """
     section = study.reference
     segments: list[Spline] = []
@@ -54,8 +54,8 @@ def build_reference(study: Study, plant: Plant) -> Reference:
             clock = segments[-1].end
         try:
             segments.append(_move(study, plant, k, start, goal, clock))
-        except LimitViolated as error:
-            raise InvalidInput(f"reference: move {k + 1} cannot be reached: {error}") from None
+        except LimitViolatedError as error:
+            raise InvalidInputError(f"reference: move {k + 1} cannot be reached: {error}") from None
         clock = segments[-1].end
     if section.dwell_s > 0:
         segments.append(constant(section.waypoints_m[-1], clock, clock + section.dwell_s))
@@ -73,11 +73,11 @@ def _move(study: Study, plant: Plant, k: int, start: float, goal: float, clock: 
         limits = section.limits
         least = shortest_duration(goal - start, limits.speed_m_s, limits.acceleration_m_s2, limits.jerk_m_s3)
         remedy = "move the waypoint" if broken[0].startswith("position") else f"{1.02 * least:.3g} s would do"
-        raise LimitViolated(f"{broken[0]} in {section.durations_s[k]:g} s; {remedy}")
+        raise LimitViolatedError(f"{broken[0]} in {section.durations_s[k]:g} s; {remedy}")
     peaks = effort_peaks(spline, task.enclose, task.effort_limits)
     for name, peak, limit in zip(EFFORTS, peaks, task.effort_limits, strict=True):
         if not peak <= limit:
-            raise LimitViolated(
+            raise LimitViolatedError(
                 f"{name} needs up to {peak:.4g}, the limit is {limit:g}; allow more time or raise the limit"
             )
     return spline

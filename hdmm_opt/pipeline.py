@@ -20,9 +20,10 @@ from stability import Composition, Failure, Gains, checker
 from tuning import Executor, Outcome, SearchState, Selection, select, start, step
 
 from . import gain_file, validation
-from .errors import InvalidInput
-from .problem import Problem, assemble, resolved
+from .errors import InvalidInputError
+from .problem import KINDS, Problem, assemble, resolved
 from .proof import Verdict, certificate, diagnose, slacks, violation
+from .simulation import scenarios
 from .study import Study
 
 Array = NDArray[np.float64]
@@ -98,7 +99,7 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
         The design; proved by the checker, or with what failed.
 
     Raises:
-        InvalidInput: the study cannot be made concrete, or a state file does not fit it.
+        InvalidInputError: the study cannot be made concrete, or a state file does not fit it.
     """
     begun = time.perf_counter()
     progress.stage("reference")
@@ -181,7 +182,7 @@ def search(
 def make_evaluator(study: Study) -> Callable[[Array], Outcome]:
     """The outcome of a candidate as a pure function; infeasible candidates are never simulated."""
     problem = assemble(study)
-    runs = validation.scenarios(study)[:COST_SCENARIOS]
+    runs = scenarios(study)[:COST_SCENARIOS]
 
     def evaluate(point: Array) -> Outcome:
         gains = problem.gains(point)
@@ -232,12 +233,16 @@ def _from_checker(report: checker.Report) -> list[Verdict]:
 def rejected_document(problem_study: Study, design_: Design) -> dict[str, Any]:
     """What a refused design leaves behind: the study, the gains, and what failed."""
     return {
-        "schema": "hdmm-opt/rejected/1",
+        "schema": gain_file.REJECTED,
         "study": problem_study.model_dump(mode="json", exclude_none=True),
-        "gains": [{"beta": g.beta, "epsilon": g.epsilon, "delta": g.delta, "sigma": g.sigma} for g in design_.gains],
+        "gains": [
+            {"name": f"{kind}_{k + 1}", "value": getattr(g, kind)}
+            for k, g in enumerate(design_.gains)
+            for kind in KINDS
+        ],
         "obligations": [
             {"name": v.name, "statement": v.statement, "margin": _finite(v.margin), "unit": v.unit,
-             "verdict": v.verdict, "remedy": v.remedy}
+             "verdict": v.verdict, "remedy": v.remedy, "witness": v.witness}
             for v in design_.verdicts
         ],
         "missed": list(design_.missed),
@@ -298,9 +303,11 @@ def _restore(options: Options, key: str) -> SearchState | None:
             evaluations=int(data["evaluations"]),
         )
     except (OSError, ValueError, KeyError, TypeError):
-        raise InvalidInput(f"{options.state}: not a state of this release; delete it or leave out --resume") from None
+        raise InvalidInputError(
+            f"{options.state}: not a state of this release; delete it or leave out --resume"
+        ) from None
     if not same:
-        raise InvalidInput(
+        raise InvalidInputError(
             f"{options.state}: belongs to another study, seed or budget; delete it or leave out --resume"
         )
     return state

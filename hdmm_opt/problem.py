@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -13,11 +14,11 @@ from stability import Bounds, Gains, Interval, LoopModel
 from trajectories import Reference
 
 from .control import RAC
-from .errors import InvalidInput
+from .errors import InvalidInputError
 from .motion import build_reference
 from .plants import Parameter, Plant, pmsm_emla
 from .simulation import ClosedLoop
-from .study import Study, nearest
+from .study import Study, nearest, validated
 
 Array = NDArray[np.float64]
 
@@ -105,13 +106,13 @@ def assemble(study: Study, reference: Reference | None = None) -> Problem:
         reference: A reference that was already built for it.
 
     Raises:
-        InvalidInput: an unreachable reference, or a section that does not fit the plant.
+        InvalidInputError: an unreachable reference, or a section that does not fit the plant.
     """
     plant = pmsm_emla(study.plant.level, study.plant.resolved())
     try:
         law = RAC(plant=plant, modelling=study.controller.modelling)
     except ValueError as error:
-        raise InvalidInput(f"controller: {error}") from None
+        raise InvalidInputError(f"controller: {error}") from None
     noise = _by_state("uncertainty.noise", study.uncertainty.noise, plant)
     initial = _by_state("uncertainty.initial", study.uncertainty.initial, plant)
     ranges = _ranges(study, law)
@@ -127,9 +128,7 @@ def assemble(study: Study, reference: Reference | None = None) -> Problem:
         initial=initial,
         period=1 / study.controller.rate_hz,
     )
-    loop = ClosedLoop(
-        law=law, period=bounds.period, noise=noise, initial=initial, nominal_load=nominal["load_force"]
-    )
+    loop = ClosedLoop(law=law, period=bounds.period, noise=noise, initial=initial, nominal_load=nominal["load_force"])
     return Problem(
         study=study, plant=plant, law=law, model=law.loop_model(), reference=reference, bounds=bounds,
         box=_box(plant), ranges=ranges, loop=loop,
@@ -165,14 +164,14 @@ def _box(plant: Plant) -> Array:
 def state_key(plant: Plant, state: str) -> str:
     """The key of a state in a study: its name and its unit."""
     unit = plant.state_units[plant.states.index(state)]
-    return state if state in ("i_q", "i_d") and unit != "A" else f"{state}_{_SUFFIX[unit]}"
+    return f"{state}_{_SUFFIX[unit]}"
 
 
 def _by_state(section: str, given: dict[str, float], plant: Plant) -> tuple[float, ...]:
     keys = [state_key(plant, state) for state in plant.states]
     for name in given:
         if name not in keys:
-            raise InvalidInput(f'unknown key "{section}.{name}"; {nearest(name, keys)}')
+            raise InvalidInputError(f'unknown key "{section}.{name}"; {nearest(name, keys)}')
     return tuple(given.get(key, 0.0) for key in keys)
 
 
@@ -181,7 +180,7 @@ def _ranges(study: Study, law: RAC) -> tuple[GainRange, ...]:
     given = study.controller.gains
     for name in given:
         if name not in wanted:
-            raise InvalidInput(f'unknown key "controller.gains.{name}"; {nearest(name, wanted)}')
+            raise InvalidInputError(f'unknown key "controller.gains.{name}"; {nearest(name, wanted)}')
     defaults = {"epsilon": 0.0, "delta": 1.0, "sigma": 1.0}
     result = []
     for k, row in enumerate(law.governed):
@@ -189,7 +188,9 @@ def _ranges(study: Study, law: RAC) -> tuple[GainRange, ...]:
             name = f"{kind}_{k + 1}"
             entry = given.get(name)
             if entry is None and kind == "beta":
-                raise InvalidInput(f'"controller.gains.{name}" is required and missing; give value, or min and max')
+                raise InvalidInputError(
+                    f'"controller.gains.{name}" is required and missing; give value, or min and max'
+                )
             if entry is None:
                 low = high = defaults[kind]
             elif entry.value is not None:
@@ -197,7 +198,7 @@ def _ranges(study: Study, law: RAC) -> tuple[GainRange, ...]:
             else:
                 low, high = float(entry.min or 0.0), float(entry.max or 0.0)
             if kind != "epsilon" and not low > 0:
-                raise InvalidInput(f"controller.gains.{name} must be positive: got {low:g}; correct the value")
+                raise InvalidInputError(f"controller.gains.{name} must be positive: got {low:g}; correct the value")
             result.append(GainRange(name=name, low=low, high=high, unit=_unit(law, row, kind)))
     return tuple(result)
 
@@ -232,3 +233,26 @@ def resolved(problem: Problem) -> dict[str, Any]:
         "initial": dict(zip(plant.states, problem.bounds.initial, strict=True)),
     }
     return data
+
+
+def study_of(data: dict[str, Any]) -> Study:
+    """The study that `resolved` came from.
+
+    Raises:
+        InvalidInputError: the section is not that of a study.
+    """
+    plain = json.loads(json.dumps(data))
+    plain.pop("sha256", None)
+    for key in ("limits", "stroke_m"):
+        plain["plant"].pop(key, None)
+    for parameter in plain["plant"]["parameters"].values():
+        parameter.pop("meaning", None)
+    uncertainty = plain["uncertainty"]
+    if "disturbances" in uncertainty:
+        plant = pmsm_emla(plain["plant"]["level"])
+        keyed = {
+            kind: {state_key(plant, state): value for state, value in uncertainty[kind].items()}
+            for kind in ("noise", "initial")
+        }
+        plain["uncertainty"] = {"load_force_n": uncertainty["disturbances"]["load_force"], **keyed}
+    return validated(plain, "study")

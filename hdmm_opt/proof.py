@@ -7,13 +7,17 @@ the finished document.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 
 from stability import Composition, Failure, Gains, certify
 
+from .control import RAC
 from .problem import Problem
+from .simulation import ClosedLoop, Scenario, scenarios
 
 #: Limits and requirements must hold with this relative room, so that the exact check, which rounds outwards, agrees.
 HEADROOM = 2e-4
@@ -30,6 +34,7 @@ class Verdict:
         unit: Unit of the margin.
         verdict: "proved", "refuted" or "undecided".
         remedy: What would make it pass; empty where it passes.
+        witness: For a refuted obligation, the scenario and control rate that replay it.
     """
 
     name: str
@@ -38,6 +43,7 @@ class Verdict:
     unit: str
     verdict: str
     remedy: str = ""
+    witness: dict[str, Any] | None = None
 
 
 def certificate(problem: Problem, gains: tuple[Gains, ...], *, period: float | None = None) -> Composition | Failure:
@@ -108,66 +114,72 @@ def diagnose(problem: Problem, gains: tuple[Gains, ...]) -> list[Verdict]:
 
 
 def _authority(problem: Problem, gains: tuple[Gains, ...], continuous: Composition | Failure) -> list[Verdict]:
-    limit = problem.plant.limits[0]
-    name, unit = limit.name, limit.unit
     if isinstance(continuous, Composition):
-        worst = [(n, size, top, u) for n, size, top, u in slacks(problem, continuous) if n != "tracking error"]
+        worst = [entry for entry in slacks(problem, continuous) if entry[0] != "tracking error"]
         name, size, top, unit = max(worst, key=lambda entry: entry[1] / entry[2])
         if size <= top:
             return []
-        statement = f"the certified set asks for {size:.4g} {unit} of {name}, the limit is {top:.4g} {unit}"
-        return [_authority_verdict(problem, gains, statement, top - size, unit, "undecided")]
+        return [
+            Verdict(
+                name="authority", margin=top - size, unit=unit, verdict="undecided",
+                statement=f"the certified set asks for {size:.4g} {unit} of {name}, the limit is {top:.4g} {unit}",
+                remedy=_less_demand(problem, size - top, unit),
+            )
+        ]  # fmt: skip
+    limit = problem.plant.limits[0]
     demand, scenario = largest_demand(problem, gains)
     if demand <= limit.value:
         return []
-    statement = (
-        f"simulated without sampling, the law asks for {demand:.4g} {unit} of {name} in scenario {scenario}; "
-        f"the limit is {limit.value:.4g} {unit}"
-    )
-    return [_authority_verdict(problem, gains, statement, limit.value - demand, unit, "refuted")]
+    return [
+        Verdict(
+            name="authority",
+            statement=f"simulated without sampling, the law asks for {demand:.4g} {limit.unit} of {limit.name} in "
+            f'scenario "{scenario.name}"; the limit is {limit.value:.4g} {limit.unit}',
+            margin=limit.value - demand,
+            unit=limit.unit,
+            verdict="refuted",
+            remedy=_terms_that_help(problem, gains) or _less_demand(problem, demand - limit.value, limit.unit),
+            witness={"scenario": asdict(scenario), "rate_hz": 1 / demand_period(problem)},
+        )
+    ]
 
 
-def _authority_verdict(
-    problem: Problem, gains: tuple[Gains, ...], statement: str, margin: float, unit: str, verdict: str
-) -> Verdict:
-    missing = [t for t in ("mechanics", "resistance", "back_emf", "decoupling") if t not in problem.law.modelling]
-    if problem.plant.level == "torque":
-        missing = [term for term in missing if term == "mechanics"]
-    remedy = f"lower the demand by {-margin:.4g} {unit} (slower reference, smaller load range, smaller gains)"
-    for terms in ([t] for t in missing if t == "back_emf"):
-        helped = _demand_with(problem, gains, (*problem.law.modelling, *terms))
-        if helped <= problem.plant.limits[0].value:
-            remedy = f'add the modelling term "{terms[0]}": the demand in the same scenarios falls to {helped:.4g} {unit}'
-    return Verdict(
-        name="authority", statement=statement, margin=margin, unit=unit, verdict=verdict, remedy=remedy
-    )
+def _less_demand(problem: Problem, excess: float, unit: str) -> str:
+    hint = "" if "mechanics" in problem.law.modelling else ', or the modelling term "mechanics"'
+    return f"lower the demand by {excess:.4g} {unit}: a slower reference, a smaller load range, smaller gains{hint}"
 
 
-def largest_demand(problem: Problem, gains: tuple[Gains, ...]) -> tuple[float, str]:
-    """The largest input norm that the law asks for in the study's scenarios, before the amplitude limit, and where.
+def _terms_that_help(problem: Problem, gains: tuple[Gains, ...]) -> str:
+    """The fewest electrical modelling terms that bring the demand inside the limit, as advice."""
+    if problem.plant.level != "voltage":
+        return ""
+    limit = problem.plant.limits[0]
+    missing = [term for term in ("back_emf", "decoupling", "resistance") if term not in problem.law.modelling]
+    for count in range(1, len(missing) + 1):
+        for terms in combinations(missing, count):
+            law = RAC(plant=problem.plant, modelling=(*problem.law.modelling, *terms))
+            helped, _ = largest_demand(replace(problem, law=law, model=law.loop_model()), gains)
+            if helped <= limit.value:
+                named = " and ".join(f'"{term}"' for term in terms)
+                return f"with {named} in controller.modelling the same scenarios ask for {helped:.4g} {limit.unit}"
+    return ""
 
-    The law runs at eight times the study's rate or faster, so that sampling plays no part.
-    """
-    from .simulation import ClosedLoop
-    from .validation import scenarios
 
-    period = min(problem.bounds.period / 8, 1 / 16000)
+def demand_period(problem: Problem) -> float:
+    """A control period so short that sampling plays no part, s."""
+    return min(problem.bounds.period / 8, 1 / 16000)
+
+
+def largest_demand(problem: Problem, gains: tuple[Gains, ...]) -> tuple[float, Scenario]:
+    """The largest input norm that the law asks for in the study's scenarios, before the amplitude limit, and where."""
     loop = ClosedLoop(
-        law=problem.law, period=period, noise=problem.bounds.noise, initial=problem.bounds.initial,
+        law=problem.law, period=demand_period(problem), noise=problem.bounds.noise, initial=problem.bounds.initial,
         nominal_load=problem.loop.nominal_load,
     )  # fmt: skip
-    demands = []
-    for scenario in scenarios(problem.study):
-        trace = loop.run(gains, problem.reference, replace(scenario, noise=0.0))
-        demands.append((loop.demand(trace, gains), scenario.name))
-    return max(demands)
-
-
-def _demand_with(problem: Problem, gains: tuple[Gains, ...], modelling: tuple[str, ...]) -> float:
-    from .control import RAC
-
-    law = RAC(plant=problem.plant, modelling=modelling)
-    return largest_demand(replace(problem, law=law, model=law.loop_model()), gains)[0]
+    found = [replace(scenario, noise=0.0) for scenario in scenarios(problem.study)]
+    demands = [loop.demand(loop.run(gains, problem.reference, scenario), gains) for scenario in found]
+    worst = int(np.argmax(demands))
+    return demands[worst], found[worst]
 
 
 def _conditions(problem: Problem, continuous: Composition | Failure) -> list[Verdict]:

@@ -6,12 +6,13 @@ import difflib
 import math
 import tomllib
 from importlib import resources
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from .errors import InvalidInput
+from .errors import InvalidInputError
 from .plants import Parameter, defaults
 
 Positive = Annotated[float, Field(gt=0)]
@@ -113,11 +114,11 @@ class ReferenceSection(_Section):
         if timed and len(self.durations_s) != moves:
             raise ValueError(
                 f"|durations_s|must give one duration for each of the {moves} moves: got {len(self.durations_s)}|"
-                "list them, or use kind = \"bspline\" with objective = \"time\""
+                'list them, or use kind = "bspline" with objective = "time"'
             )
         if not timed and self.durations_s:
             raise ValueError("|durations_s|has no place in a minimum-time reference|remove it")
-        if any(a == b for a, b in zip(self.waypoints_m, self.waypoints_m[1:], strict=False)):
+        if any(a == b for a, b in pairwise(self.waypoints_m)):
             raise ValueError("|waypoints_m|must differ from one to the next|use dwell_s for a pause")
         return self
 
@@ -222,7 +223,7 @@ class Study(_Section):
                     f"[{low:g}, {high:g}]: got {outside[0]:g}|widen the assumption or change the scenario"
                 )
             times = [t for t, _ in scenario.load_n]
-            if any(b <= a for a, b in zip(times, times[1:], strict=False)):
+            if any(b <= a for a, b in pairwise(times)):
                 raise ValueError(f"|validation.scenarios.{scenario.name}|needs increasing times in load_n|sort them")
             for name in scenario.parameters:
                 known = defaults(self.plant.level)
@@ -242,6 +243,7 @@ def _ordered(name: str, pair: Pair) -> None:
 
 
 def nearest(name: str, known: Any) -> str:
+    """Advice on a misspelt name: the nearest known one, or all of them."""
     close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.4)
     return f'did you mean "{close[0]}"?' if close else "known: " + ", ".join(known)
 
@@ -262,18 +264,20 @@ def load(name: str) -> Study:
         The validated study.
 
     Raises:
-        InvalidInput: one line with the rule, what came, and what would do.
+        InvalidInputError: one line with the rule, what came, and what would do.
     """
     if name in bundled():
         return parse((resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8"), name)
     path = Path(name)
     if path.suffix != ".toml" and not path.exists():
-        raise InvalidInput(f'no bundled study is named "{name}"; {nearest(name, bundled())} (or give a .toml path)')
+        raise InvalidInputError(
+            f'no bundled study is named "{name}"; {nearest(name, bundled())} (or give a .toml path)'
+        )
     try:
         return parse(path.read_text(encoding="utf-8"), str(path))
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
-        raise InvalidInput(f"{path}: cannot read the study file: {reason}; check the path") from None
+        raise InvalidInputError(f"{path}: cannot read the study file: {reason}; check the path") from None
 
 
 def parse(text: str, where: str) -> Study:
@@ -281,11 +285,20 @@ def parse(text: str, where: str) -> Study:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InvalidInput(f"{where}: not valid TOML: {error}; correct that line") from None
+        raise InvalidInputError(f"{where}: not valid TOML: {error}; correct that line") from None
+    return validated(data, where)
+
+
+def validated(data: dict[str, Any], where: str) -> Study:
+    """Validate a study given as data; `where` names it in errors.
+
+    Raises:
+        InvalidInputError: one line with the rule, what came, and what would do.
+    """
     try:
         return Study.model_validate(data)
     except ValidationError as error:
-        raise InvalidInput(f"{where}: {_one_line(error)}") from None
+        raise InvalidInputError(f"{where}: {_one_line(error)}") from None
 
 
 def _one_line(error: ValidationError) -> str:
@@ -328,5 +341,3 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for part in getattr(annotation, "__args__", ()) for model in _models(part)]
-
-

@@ -12,7 +12,7 @@ import numpy as np
 from stability import Composition, Gains
 
 from .problem import Problem
-from .simulation import Metrics, Scenario, Trace, measure
+from .simulation import Metrics, Scenario, Trace, measure, scenarios
 from .study import Study
 
 #: Confidence of the Clopper-Pearson interval.
@@ -49,17 +49,6 @@ class Validation:
     largest_error: float
     largest_late_error: float
     missed: tuple[str, ...]
-
-
-def scenarios(study: Study) -> list[Scenario]:
-    """The scenarios of a study."""
-    return [
-        Scenario(
-            name=s.name, load=s.load_n, parameters=s.parameters, noise=s.noise, initial=s.initial,
-            seed=study.tuning.seed + k,
-        )
-        for k, s in enumerate(study.validation.scenarios)
-    ]  # fmt: skip
 
 
 def figures(problem: Problem, trace: Trace) -> Metrics:
@@ -106,13 +95,13 @@ def validate(
     if monte_carlo:
         progress("Monte Carlo")
         draws = [(s, run(s)) for s in _draws(problem, monte_carlo, seed)]
-        good = sum(not _missed(problem.study, s.name, m) for s, m in draws)
+        good = sum(not missed(problem.study, s.name, m) for s, m in draws)
         drawn = {"runs": float(monte_carlo), "met": float(good), **clopper_pearson(good, monte_carlo)}
         everything += draws
-    missed = tuple(text for s, m in everything for text in _missed(problem.study, s.name, m))
+    failures = tuple(text for s, m in everything for text in missed(problem.study, s.name, m))
     late = max(m.maximum_error_m for _, m in everything)
     return Validation(
-        runs=runs, worst=worst, monte_carlo=drawn, largest_error=max(errors), largest_late_error=late, missed=missed
+        runs=runs, worst=worst, monte_carlo=drawn, largest_error=max(errors), largest_late_error=late, missed=failures
     )
 
 
@@ -185,7 +174,8 @@ def clopper_pearson(good: int, count: int) -> dict[str, float]:
     return {"lower": low, "upper": high, "confidence": CONFIDENCE}
 
 
-def _missed(study: Study, name: str, metrics: Metrics) -> list[str]:
+def missed(study: Study, name: str, metrics: Metrics) -> list[str]:
+    """Requirements of the study that a run missed, as text."""
     found = ["diverged in scenario " + name] if metrics.diverged else []
     for requirement, metric in METRIC_OF.items():
         limit, value = getattr(study.requirements, requirement), getattr(metrics, metric)

@@ -18,7 +18,7 @@ import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -33,21 +33,21 @@ REQUIRED = {
 MAX_BYTES, MAX_DIGITS, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 20_000_000, 400, 5_000, 12, 5_000
 #: Relative width given to every gain, so that the proof holds for its decimal, its float64 and its float32.
 ROUNDING = Fraction(1, 2**23)
-BITS = 96
+BITS, MAX_SHIFT = 96, 20_000
 
 
-class Unreadable(Exception):
+class UnreadableError(Exception):
     """The file is not a well-formed gain file."""
 
 
-class NotProved(Exception):
+class NotProvedError(Exception):
     """A bound does not exist."""
 
 
 def need(condition: bool, message: str) -> None:
-    """Raise `Unreadable` unless the condition holds."""
+    """Raise `UnreadableError` unless the condition holds."""
     if not condition:
-        raise Unreadable(message)
+        raise UnreadableError(message)
 
 
 # --- intervals: pairs (low, high) of Fractions, rounded outwards to BITS significant bits -------------------------
@@ -61,6 +61,8 @@ def down(x: Fraction) -> Fraction:
     """The largest number of BITS bits that is not above x."""
     numerator, denominator = x.numerator, x.denominator
     shift = BITS - (abs(numerator).bit_length() - denominator.bit_length())
+    if abs(shift) > MAX_SHIFT:
+        raise NotProvedError("a bound leaves the range of numbers that the checker handles")
     if denominator.bit_length() <= BITS and abs(numerator).bit_length() <= BITS:
         return x
     if shift >= 0:
@@ -99,7 +101,7 @@ def mul(a: Interval, b: Interval) -> Interval:
 def inverse(a: Interval) -> Interval:
     """Reciprocal."""
     if a[0] <= 0 <= a[1]:
-        raise NotProved("a divisor can vanish in the assumed box")
+        raise NotProvedError("a divisor can vanish in the assumed box")
     return down(1 / a[1]), up(1 / a[0])
 
 
@@ -112,7 +114,7 @@ def square(a: Interval) -> Interval:
 def root(x: Fraction, upwards: bool) -> Fraction:
     """A rational bound on the square root."""
     if x < 0:
-        raise NotProved("a square root of a negative number in the assumed box")
+        raise NotProvedError("a square root of a negative number in the assumed box")
     shift = 2 * max(0, BITS - (x.numerator.bit_length() - x.denominator.bit_length()) // 2)
     scaled = (x.numerator << shift) // x.denominator
     return Fraction(math.isqrt(scaled) + (1 if upwards else 0), 1 << (shift // 2)) + (
@@ -181,9 +183,9 @@ def times(form: Form, factor: Interval) -> Form:
 
 @dataclass(frozen=True)
 class Node:
-    """Value of an operation: identity, form and range."""
+    """Value of an operation: identity (equal operations share one), form and range."""
 
-    key: Any
+    key: int
     form: Form
     range: Interval
 
@@ -194,7 +196,12 @@ class Table:
 
     ranges: dict[str, Interval] = field(default_factory=lambda: {"": ONE})
     definitions: dict[str, Form] = field(default_factory=dict)
-    names: dict[Any, str] = field(default_factory=dict)
+    names: dict[int, str] = field(default_factory=dict)
+    keys: dict[tuple[Any, ...], int] = field(default_factory=dict)
+
+    def key(self, *operation: Any) -> int:
+        """A number for an operation; the same for the same operator on the same arguments."""
+        return self.keys.setdefault(operation, len(self.keys))
 
     def over(self, form: Form) -> Interval:
         """Range of a form."""
@@ -203,11 +210,11 @@ class Table:
             total = add(total, mul(value, self.ranges[symbol]))
         return total
 
-    def node(self, key: Any, form: Form, natural: Interval) -> Node:
+    def node(self, key: int, form: Form, natural: Interval) -> Node:
         """A value whose range is the better of two enclosures."""
         return Node(key, form, meet(natural, self.over(form)))
 
-    def fresh(self, key: Any, definition: Form, natural: Interval) -> Node:
+    def fresh(self, key: int, definition: Form, natural: Interval) -> Node:
         """A nonlinear value: a symbol of its own, the same for the same operation."""
         if key not in self.names:
             name = self.names[key] = f"n{len(self.names)}"
@@ -223,7 +230,9 @@ class Table:
         return form
 
 
-def walk(program: dict[str, Any], read: Callable[[str], Any], const: Callable[[Fraction], Any], apply: Any) -> list[Any]:
+def walk(
+    program: dict[str, Any], read: Callable[[str], Any], const: Callable[[Fraction], Any], apply: Any
+) -> list[Any]:
     """Run an operation list in any arithmetic; returns every entry."""
     table: list[Any] = []
     for operator, *arguments in program["operations"]:
@@ -240,12 +249,11 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
     """Outputs of an operation list in linear forms."""
 
     def const(value: Fraction) -> Node:
-        return Node(("const", value), {"": (value, value)}, (value, value))
+        return Node(table.key("const", value), {"": (value, value)}, (value, value))
 
     def apply(operator: str, a: Node, b: Node | None = None) -> Node:
-        key = (operator, a.key) if b is None else (operator, *sorted((a.key, b.key), key=repr))
-        if operator in ("sub", "div") and b is not None:
-            key = (operator, a.key, b.key)
+        arguments = [a.key] if b is None else [a.key, b.key]
+        key = table.key(operator, *(arguments if operator in ("sub", "div") else sorted(arguments)))
         if operator == "neg":
             return table.node(key, times(a.form, (Fraction(-1), Fraction(-1))), neg(a.range))
         if operator == "tanh":
@@ -254,7 +262,7 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
             bounds = root(a.range[0], False), root(a.range[1], True)
             return table.fresh(key, {"": bounds}, bounds)
         if b is None:
-            return multiply(("mul", a.key, a.key), a, a)
+            return multiply(table.key("mul", a.key, a.key), a, a)
         if operator == "add":
             return table.node(key, plus(a.form, b.form), add(a.range, b.range))
         if operator == "sub":
@@ -263,7 +271,7 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
             return table.node(key, times(a.form, inverse(b.range)), mul(a.range, inverse(b.range)))
         return multiply(key, a, b)
 
-    def multiply(key: Any, a: Node, b: Node) -> Node:
+    def multiply(key: int, a: Node, b: Node) -> Node:
         natural = square(a.range) if a.key == b.key else mul(a.range, b.range)
         for one, other in ((a, b), (b, a)):
             if set(one.form) <= {""}:
@@ -334,7 +342,7 @@ class Claim:
     noise: list[Fraction]
     initial: list[Fraction]
     period: Fraction
-    gains: list[tuple[Fraction, Fraction, Fraction, Fraction]]
+    gains: list[tuple[Fraction, ...]]
     decay: Fraction
     weights: list[Fraction]
     young: list[Fraction]
@@ -359,7 +367,10 @@ def wrong_schema(found: Any) -> str:
 
 def number(value: Any, what: str) -> Fraction:
     """A number of the file as an exact rational."""
-    need(not isinstance(value, bool) and isinstance(value, int | Fraction | str), f"{what} must be a number: got {value!r:.60}")
+    need(
+        not isinstance(value, bool) and isinstance(value, int | Fraction | str),
+        f"{what} must be a number: got {value!r:.60}",
+    )
     if isinstance(value, str):
         return rational(value, what)
     return Fraction(value)
@@ -373,7 +384,7 @@ def rational(text: str, what: str = "a number") -> Fraction:
         need(abs(int(exponent)) <= 400, f"{what} has an exponent beyond 400: {text[:40]}")
         return Fraction(text)
     except (ValueError, ZeroDivisionError):
-        raise Unreadable(f"{what} must be a finite number: got {text[:40]!r}") from None
+        raise UnreadableError(f"{what} must be a finite number: got {text[:40]!r}") from None
 
 
 def numbers(value: Any, count: int, what: str) -> list[Fraction]:
@@ -391,16 +402,18 @@ def parse(text: str) -> dict[str, Any]:
         return dict(items)
 
     def constant(name: str) -> Any:
-        raise Unreadable(f"{name} is not a number that a gain file may hold")
+        raise UnreadableError(f"{name} is not a number that a gain file may hold")
 
     try:
         data = json.loads(
             text, parse_float=rational, parse_int=rational, parse_constant=constant, object_pairs_hook=pairs
         )
     except json.JSONDecodeError as error:
-        raise Unreadable(f"not a complete JSON file: {error.msg} at line {error.lineno}; write it again with design") from None
+        raise UnreadableError(
+            f"not a complete JSON file: {error.msg} at line {error.lineno}; write it again with design"
+        ) from None
     except RecursionError:
-        raise Unreadable("the JSON is nested too deeply") from None
+        raise UnreadableError("the JSON is nested too deeply") from None
     need(isinstance(data, dict), "a gain file is a JSON object")
     return data
 
@@ -419,21 +432,35 @@ def check_digests(text: str) -> None:
     for part in ("study", "reference"):
         section = plain.get(part)
         need(isinstance(section, dict), f'the section "{part}" is missing; write the file again with design')
-        need(section.get("sha256") == digest(section, "sha256"), f'"{part}" was changed after the file was written (sha256 differs)')
-    need(plain.get("sha256") == digest(plain, "sha256", "provenance"), "the file was changed after it was written (sha256 differs)")
+        need(
+            section.get("sha256") == digest(section, "sha256"),
+            f'"{part}" was changed after the file was written (sha256 differs)',
+        )
+    need(
+        plain.get("sha256") == digest(plain, "sha256", "provenance"),
+        "the file was changed after it was written (sha256 differs)",
+    )
 
 
 def valid_program(program: Any, what: str) -> dict[str, Any]:
     """Structure of an operation list: known operators, arguments that come earlier."""
     need(isinstance(program, dict) and isinstance(program.get("operations"), list), f"{what} must be an operation list")
-    operations, arity = program["operations"], {"neg": 1, "sq": 1, "sqrt": 1, "tanh": 1, "add": 2, "sub": 2, "mul": 2, "div": 2}
+    operations, arity = (
+        program["operations"],
+        {"neg": 1, "sq": 1, "sqrt": 1, "tanh": 1, "add": 2, "sub": 2, "mul": 2, "div": 2},
+    )
     need(0 < len(operations) <= MAX_OPERATIONS, f"{what} must have 1 to {MAX_OPERATIONS} operations")
     clean: list[list[Any]] = []
     for k, entry in enumerate(operations):
-        need(isinstance(entry, list) and len(entry) >= 2 and isinstance(entry[0], str), f"{what}: operation {k} is malformed")
+        need(
+            isinstance(entry, list) and len(entry) >= 2 and isinstance(entry[0], str),
+            f"{what}: operation {k} is malformed",
+        )
         operator, *arguments = entry
         if operator in ("input", "const"):
-            need(len(arguments) == 1 and isinstance(arguments[0], str), f"{what}: operation {k} needs one name or number")
+            need(
+                len(arguments) == 1 and isinstance(arguments[0], str), f"{what}: operation {k} needs one name or number"
+            )
             if operator == "const":
                 rational(arguments[0], what)
         else:
@@ -447,7 +474,9 @@ def valid_program(program: Any, what: str) -> dict[str, Any]:
 
 def index(value: Any, end: int, what: str) -> int:
     """A whole number in [0, end)."""
-    need(isinstance(value, Fraction) and value.denominator == 1 and 0 <= value < end, f"{what}: an index is out of range")
+    need(
+        isinstance(value, Fraction) and value.denominator == 1 and 0 <= value < end, f"{what}: an index is out of range"
+    )
     return int(value)
 
 
@@ -469,13 +498,13 @@ def read(data: dict[str, Any]) -> Claim:
     try:
         return _read(data)
     except (KeyError, TypeError, AttributeError, IndexError) as error:
-        raise Unreadable(f"a part of the gain file is missing or has the wrong type: {error}") from None
+        raise UnreadableError(f"a part of the gain file is missing or has the wrong type: {error}") from None
 
 
 def _read(data: dict[str, Any]) -> Claim:
     study, controller, certificate = data["study"], data["controller"], data["certificate"]
-    need(controller["law"] in REQUIRED, f'unknown law {controller["law"]!r:.40}; known: {", ".join(REQUIRED)}')
-    need(certificate["kind"] == "composition", f'unknown certificate kind {certificate["kind"]!r:.40}')
+    need(controller["law"] in REQUIRED, f"unknown law {controller['law']!r:.40}; known: {', '.join(REQUIRED)}")
+    need(certificate["kind"] == "composition", f"unknown certificate kind {certificate['kind']!r:.40}")
     model = certificate["model"]
     rows = model["rows"]
     n, m = len(rows), len(model["inputs"])
@@ -489,16 +518,20 @@ def _read(data: dict[str, Any]) -> Claim:
     need(rows[0]["target"] == "reference", "the first row must track the reference")
     governed = [i for i, row in enumerate(rows) if row["governed"]]
     drives = [index(d, n, "an input's row") for d in model["drives"]]
-    need(len(drives) == m and all(rows[d]["governed"] for d in drives), "each input must be the control of a governed row")
+    need(
+        len(drives) == m and all(rows[d]["governed"] for d in drives),
+        "each input must be the control of a governed row",
+    )
     plant = valid_program(model["plant"], "the plant")
     law = [valid_program(term, "a modelling term") for term in model["law"]]
     need(len(plant["outputs"]) == 2 * n and len(law) == len(governed), "the model does not fit the rows")
 
     assumed = assumptions(data["assumptions"], study)
     states, parameters = [row["state"] for row in rows], assumed["parameter"]
-    need(len(set(states)) == n, "two rows share a state")
     need(reads(plant, plant["outputs"][:n]) <= set(parameters), "an inertia depends on more than constant parameters")
-    known = {*states, *model["inputs"], *parameters, *assumed["disturbance"]}
+    listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], *(f"r{k}" for k in range(4))]
+    known = set(listed)
+    need(len(known) == len(listed), "a name stands for two different signals")
     need(reads(plant) <= known, "the plant reads a name without an assumption")
     nominal = {name: number(value, "a nominal value") for name, value in controller["nominal"].items()}
     for term in law:
@@ -508,12 +541,20 @@ def _read(data: dict[str, Any]) -> Claim:
     given = {entry["name"]: number(entry["value"], entry["name"]) for entry in data["gains"]}
     names = [f"{kind}_{k + 1}" for k in range(len(governed)) for kind in ("beta", "epsilon", "delta", "sigma")]
     need(set(given) == set(names) and len(data["gains"]) == len(names), "the gains do not fit the subsystems")
-    gains = [tuple(given[f"{kind}_{k + 1}"] for kind in ("beta", "epsilon", "delta", "sigma")) for k in range(len(governed))]
+    gains = [
+        tuple(given[f"{kind}_{k + 1}"] for kind in ("beta", "epsilon", "delta", "sigma")) for k in range(len(governed))
+    ]
     need(all(b > 0 and e >= 0 and d > 0 and s > 0 for b, e, d, s in gains), "gains must be positive")
     rate = number(controller["rate_hz"], "rate_hz")
-    need(rate > 0 and rate == number(study["controller"]["rate_hz"], "rate_hz"), "the control rate differs from the study's")
+    need(
+        rate > 0 and rate == number(study["controller"]["rate_hz"], "rate_hz"),
+        "the control rate differs from the study's",
+    )
     limits, stroke = study["plant"]["limits"], numbers(study["plant"]["stroke_m"], 2, "stroke_m")
-    need(limits and all(set(limit["signals"]) <= {*states, *model["inputs"]} for limit in limits), "a limit names an unknown signal")
+    need(
+        limits and all(set(limit["signals"]) <= {*states, *model["inputs"]} for limit in limits),
+        "a limit names an unknown signal",
+    )
     need(set(limits[0]["signals"]) == set(model["inputs"]), "the first limit must be the amplitude limit of the inputs")
     return Claim(
         rows=rows, drives=drives, inputs=model["inputs"], plant=plant, law=law, parameters=parameters,
@@ -534,20 +575,26 @@ def assumptions(entries: list[dict[str, Any]], study: dict[str, Any]) -> dict[st
     for entry in entries:
         kind, _, name = entry["name"].partition(".")
         bounds = number(entry["lower"], entry["name"]), number(entry["upper"], entry["name"])
-        need(kind in found and name not in found[kind], f'unknown or doubled assumption {entry["name"]!r:.60}')
-        need(bounds[0] <= bounds[1], f'{entry["name"]}: lower > upper')
+        need(kind in found and name not in found[kind], f"unknown or doubled assumption {entry['name']!r:.60}")
+        need(bounds[0] <= bounds[1], f"{entry['name']}: lower > upper")
         found[kind][name] = bounds
     uncertainty = study["uncertainty"]
     stated: list[tuple[str, str, Fraction, Fraction]] = []
     for name, entry in study["plant"]["parameters"].items():
-        value, spread = number(entry["value"], name), abs(number(entry["value"], name)) * number(entry["tolerance"], name)
+        value, spread = (
+            number(entry["value"], name),
+            abs(number(entry["value"], name)) * number(entry["tolerance"], name),
+        )
         stated.append(("parameter", name, value - spread, value + spread))
     for name, (low, high) in uncertainty["disturbances"].items():
         stated.append(("disturbance", name, number(low, name), number(high, name)))
     for kind in ("noise", "initial"):
         for name, value in uncertainty[kind].items():
             stated.append((kind, name, -number(value, name), number(value, name)))
-    need({(k, n) for k, n, _, _ in stated} == {(k, n) for k, of in found.items() for n in of}, "the assumptions are not those of the study")
+    need(
+        {(k, n) for k, n, _, _ in stated} == {(k, n) for k, of in found.items() for n in of},
+        "the assumptions are not those of the study",
+    )
     for kind, name, low, high in stated:
         bounds = found[kind][name]
         need(bounds[0] <= low and high <= bounds[1], f"the assumption {kind}.{name} is narrower than the study's")
@@ -558,22 +605,22 @@ def reference_bounds(reference: dict[str, Any]) -> list[Interval]:
     """Position … jerk of the splines, from their control points; refuses jumps and a moving end."""
     hulls: list[list[Fraction]] = [[], [], [], []]
     previous: list[Fraction] | None = None
-    need(isinstance(reference["segments"], list) and reference["segments"], "the reference has no segment")
+    need(isinstance(reference["segments"], list) and len(reference["segments"]) > 0, "the reference has no segment")
     for segment in reference["segments"]:
         count = len(segment["coefficients"])
         need(segment["degree"] == 5 and 6 <= count <= MAX_COEFFICIENTS, "a segment is a spline of degree 5")
         knots = numbers(segment["knots"], count + 6, "knots")
         points = numbers(segment["coefficients"], count, "coefficients")
         need(knots[0] == knots[5] and knots[-1] == knots[-6], "a segment's knots must be clamped")
-        need(all(a < b for a, b in zip(knots[5:count], knots[6 : count + 1], strict=True)), "inner knots must increase")
+        need(knots == sorted(knots), "knots must not decrease")
+        need(all(a < b for a, b in pairwise(knots[5 : count + 1])), "inner knots must increase")
         ends: list[tuple[Fraction, Fraction]] = []
         for order in range(4):
             hulls[order] += points
             ends.append((points[0], points[-1]))
             degree = 5 - order
             points = [
-                degree * (b - a) / (knots[j + degree + 1] - knots[j + 1])
-                for j, (a, b) in enumerate(zip(points, points[1:], strict=False))
+                degree * (b - a) / (knots[j + degree + 1] - knots[j + 1]) for j, (a, b) in enumerate(pairwise(points))
             ]
             knots = knots[1:-1]
         need(previous is None or previous == [e[0] for e in ends[:3]], "the reference jumps between segments")
@@ -582,8 +629,12 @@ def reference_bounds(reference: dict[str, Any]) -> list[Interval]:
     for hull, stated in zip(hulls, reference["derivative_bounds"], strict=True):
         room = Fraction(1, 10**8) * max(map(abs, hull))
         low, high = number(stated["lower"], "a bound") - room, number(stated["upper"], "a bound") + room
-        need(low <= min(hull) and max(hull) <= high, f'the stated bounds on the {stated["name"]} are not those of the splines')
-    return [(min(h), max(h)) for h in hulls]
+        need(
+            low <= min(hull) and max(hull) <= high,
+            f"the stated bounds on the {stated['name']} are not those of the splines",
+        )
+    at_rest = [[], *([Fraction(0)] for _ in range(3))]
+    return [(min(h + zero), max(h + zero)) for h, zero in zip(hulls, at_rest, strict=True)]
 
 
 # --- the closed loop in error coordinates -------------------------------------------------------------------------
@@ -613,7 +664,7 @@ class Loop:
         fixed = {f"nominal.{name}": (value, value) for name, value in claim.nominal.items()}
         for name, bounds in {**fixed, **claim.parameters, **claim.disturbances}.items():
             key = ("const", bounds[0]) if bounds[0] == bounds[1] else ("input", name)
-            self.nodes[name] = Node(key, {"": bounds}, bounds)
+            self.nodes[name] = Node(table.key(*key), {"": bounds}, bounds)
         for k, bounds in enumerate(claim.reference):
             table.ranges[f"r{k}"] = bounds
             self._name(f"r{k}", {f"r{k}": ONE})
@@ -629,7 +680,7 @@ class Loop:
             self._name(name, plus(self._kappa(row), {f"e{k}": ONE}))
 
     def _name(self, name: str, form: Form) -> None:
-        self.nodes[name] = Node(("input", name), form, self.table.over(form))
+        self.nodes[name] = Node(self.table.key("input", name), form, self.table.over(form))
 
     def _target(self, i: int) -> Form:
         target = self.claim.rows[i]["target"]
@@ -680,7 +731,7 @@ class Loop:
         values = linear(claim.plant, self.nodes, table)
         self.mass = [value.range for value in values[:n]]
         if min(mass[0] for mass in self.mass) <= 0:
-            raise NotProved("an inertia can vanish inside the assumptions")
+            raise NotProvedError("an inertia can vanish inside the assumptions")
         forces = [table.expand(value.form, keep="K") for value in values[n:]]
         moving = {r["state"]: times(f, inverse(m)) for r, f, m in zip(claim.rows, forces, self.mass, strict=True)}
         moving |= {f"r{k}": {f"r{k + 1}": ONE} for k in range(3)}
@@ -803,11 +854,11 @@ def start(claim: Claim, loop: Loop) -> Fraction:
 
 
 def spare_decay(claim: Claim, loop: Loop) -> Fraction:
-    """By how much μ could grow before the conditions fail, to a part in 64; negative where they fail already."""
+    """By how much μ could grow before the conditions fail, to a part in 4096; negative where they fail already."""
     if not conditions_hold(claim, loop, Fraction(0)):
         return -claim.decay
     low, high = Fraction(0), claim.decay
-    for _ in range(6):
+    for _ in range(12):
         trial = (low + high) / 2
         low, high = (trial, high) if conditions_hold(claim, loop, trial) else (low, trial)
     return low
@@ -846,7 +897,7 @@ def holds(claim: Claim, inflate: Fraction) -> bool:
             and adaptation(claim, loop) >= 0
             and ball(claim, loop, 0) <= claim.accuracy
         )
-    except NotProved:
+    except NotProvedError:
         return False
 
 
@@ -890,25 +941,55 @@ def obligations(claim: Claim) -> list[Obligation]:
 
     state("non-vacuity", "the box is not empty, holds the initial errors, and no limit is zero", vacuity(claim), "1")
     if made[0].verdict != "proved":
-        raise NotProved("the certificate is about an empty set (obligation non-vacuity)")
+        raise NotProvedError("the certificate is about an empty set (obligation non-vacuity)")
     loop = Loop(claim, ROUNDING)
     span = claim.reference[0]
     inside = min(span[0] - claim.stroke[0], claim.stroke[1] - span[1])
-    state("reference", "the reference is continuous to its acceleration, ends at rest and stays inside the stroke", inside, "m")
-    state("composition", f"P - (mu/2) diag(w M) > 0 at every vertex, mu = {float(claim.decay):.4g} 1/s", spare_decay(claim, loop), "1/s", False)
+    state(
+        "reference",
+        "the reference is continuous to its acceleration, ends at rest and stays inside the stroke",
+        inside,
+        "m",
+    )
+    state(
+        "composition",
+        f"P - (mu/2) diag(w M) > 0 at every vertex, mu = {float(claim.decay):.4g} 1/s",
+        spare_decay(claim, loop),
+        "1/s",
+        False,
+    )
     state("invariance", "no trajectory from the initial set leaves the box |Q_i| <= R_i", invariance(claim, loop), "1")
     slack, unit, which = min(authority(claim, loop), key=lambda entry: entry[0] / scale(claim, entry[2]))
     state("authority", f"every limit holds over the certified set; the tightest is {which}", slack, unit)
     spare = min(1 - loop.held_error(k) / h if h > 0 else -loop.held_error(k) for k, h in enumerate(claim.held))
-    state("sampling", f"held inputs stay within the assumed error of the continuous law at {float(1 / claim.period):g} Hz", spare, "1")
-    state("adaptation", "sampled adaptation keeps theta >= 0, and delta sigma >= mu where theta is in V", adaptation(claim, loop), "1", False)
+    state(
+        "sampling",
+        f"held inputs stay within the assumed error of the continuous law at {float(1 / claim.period):g} Hz",
+        spare,
+        "1",
+    )
+    state(
+        "adaptation",
+        "sampled adaptation keeps theta >= 0, and delta sigma >= mu where theta is in V",
+        adaptation(claim, loop),
+        "1",
+        False,
+    )
     steps = [step for step in (Fraction(1, 1000), Fraction(1, 10000), ROUNDING) if holds(claim, step)]
-    state("rounding", "everything holds for the gains as decimal, float64 and float32", (steps or [Fraction(-1)])[0], "1")
+    state(
+        "rounding", "everything holds for the gains as decimal, float64 and float32", (steps or [Fraction(-1)])[0], "1"
+    )
     error = ball(claim, loop, 0)
-    state("accuracy", f"after the transient the tracking error is at most {float(error) * 1e3:.4g} mm", claim.accuracy - error, "m", False)
+    state(
+        "accuracy",
+        f"after the transient the tracking error is at most {float(error) * 1e3:.4g} mm",
+        claim.accuracy - error,
+        "m",
+        False,
+    )
     for i, stated in enumerate(claim.ball):
         if stated < ball(claim, loop, i):
-            raise NotProved(f"the envelope states a smaller bound on Q_{i + 1} than can be proved")
+            raise NotProvedError(f"the envelope states a smaller bound on Q_{i + 1} than can be proved")
     return made
 
 
@@ -990,9 +1071,9 @@ def check_text(text: str, file: str = "") -> Report:
         made = obligations(claim)
         agree = golden_agree(data, claim)
         seen = number(data["validation"]["largest_error_m"], "largest_error_m")
-    except Unreadable as error:
+    except UnreadableError as error:
         return Report(file, 2, f"unreadable: {error}")
-    except NotProved as error:
+    except NotProvedError as error:
         return Report(file, 1, f"not proved: {error}")
     except (KeyError, TypeError, AttributeError, IndexError, ValueError, ZeroDivisionError, OverflowError) as error:
         return Report(file, 2, f"unreadable: a part of the gain file is missing or malformed: {error!r:.120}")

@@ -23,11 +23,12 @@ from .rows import ErrorRows, error_rows
 
 Array = NDArray[np.float64]
 
-#: The assumed box and the input error are this much wider than what the certificate needs, so that the exact check
-#: of a fixed point is strict.
-WIDENING = 1.004
+#: The assumed box and input error grow by this factor over what an iterate needs…
+WIDENING = 1.008
+#: …and are accepted once they keep this room, so that the exact check, which rounds outwards, is strict as well.
+ROOM = 1.002
 #: Young's ν is reduced by this share after the solve, which makes the matrix inequality strict.
-SLACK = 1e-4
+SLACK = 2e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,9 +128,9 @@ class _Search:
                     reason="the gain conditions hold for no weights", row=_weakest(rows), needed=radii, rows=rows
                 )
             needed, ball = self._radii(rows, found, decay)
-            needed = np.minimum(needed, np.maximum(self.initial, rowwise_radii(rows, radii)))
+            needed = np.minimum(needed, np.maximum(self.initial * ROOM, rowwise_radii(rows, radii)))
             ball = np.minimum(ball, radii)
-            if (needed <= radii).all() and (rows.held <= held).all():
+            if (needed * ROOM <= radii).all() and (rows.held * ROOM <= held).all():
                 return Composition(
                     decay=decay, weights=found.weights, young=found.young, leak=found.leak, radii=radii, held=held,
                     ball=ball, rows=rows,
@@ -139,8 +140,8 @@ class _Search:
                 return Failure(
                     reason="the certified set outgrows the operating box", row=worst, needed=needed, rows=rows
                 )
-            radii = np.where(needed <= radii, radii, needed * WIDENING)
-            held = np.where(rows.held <= held, held, rows.held * WIDENING)
+            radii = np.where(needed * ROOM <= radii, radii, needed * WIDENING)
+            held = np.where(rows.held * ROOM <= held, held, rows.held * WIDENING)
         return Failure(reason=f"the box did not settle in {self.STEPS} iterations", needed=radii)
 
     def _best_decay(self, rows: ErrorRows, scales: Array, previous: float | None) -> float | None:
@@ -198,9 +199,7 @@ class _Weights:
     leak: Array
 
 
-def ultimate_level(
-    rows: ErrorRows, found: Any, decay: float, epsilon: Array, delta: Array, sigma: Array
-) -> float:
+def ultimate_level(rows: ErrorRows, found: Any, decay: float, epsilon: Array, delta: Array, sigma: Array) -> float:
     """c/μ, the value below which V settles."""
     disturbance = found.weights * rows.disturbance**2 / (2 * found.young)
     on = found.leak > 0
@@ -320,12 +319,10 @@ class _Program:
                 self.problem.solve(solver=cp.CLARABEL)
             except cp.SolverError:
                 return None
-        if self.w.value is None or not np.isfinite(self.w.value).all() or not np.isfinite(self.m.value).all():
-            return None
         if self.problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
             return None
         w, m, r = (np.asarray(v.value, dtype=float) for v in (self.w, self.m, self.r))
-        if not ((w > 0).all() and (m > 0).all()):
+        if not (np.isfinite([w, m, r]).all() and (w > 0).all() and (m > 0).all()):
             return None
         young = m / w * (1 - SLACK) * rows.mass_high
         leak = np.where(r / w > 1e-6 * young / np.maximum(rows.mass_high, 1e-300), r / w, 0.0) * (self.gain.value > 0)

@@ -60,9 +60,9 @@ class Form:
 
 @dataclass(frozen=True)
 class Value:
-    """A node of an expression: its canonical key, its form, and its range."""
+    """A node of an expression: a key that equal operations share, its form, and its range."""
 
-    key: tuple[Any, ...]
+    key: int
     form: Form
     range: Interval
 
@@ -73,7 +73,12 @@ class Symbols:
 
     ranges: dict[str, Interval] = field(default_factory=dict)
     definitions: dict[str, Form] = field(default_factory=dict)
-    _named: dict[tuple[Any, ...], str] = field(default_factory=dict)
+    _named: dict[int, str] = field(default_factory=dict)
+    _keys: dict[tuple[Any, ...], int] = field(default_factory=dict)
+
+    def key(self, *operation: Any) -> int:
+        """A number for an operation; the same for the same operator on the same arguments."""
+        return self._keys.setdefault(operation, len(self._keys))
 
     def range_of(self, form: Form) -> Interval:
         """The range of a form over the ranges of its symbols."""
@@ -90,7 +95,7 @@ class Symbols:
                 form = rest + self.definitions[symbol].scaled(factor)
         return form
 
-    def node(self, key: tuple[Any, ...], definition: Form, bounds: Interval) -> Value:
+    def node(self, key: int, definition: Form, bounds: Interval) -> Value:
         """The value of a nonlinear operation: a symbol of its own, shared by equal operations."""
         if key not in self._named:
             name = f"n{len(self._named)}"
@@ -101,12 +106,12 @@ class Symbols:
 
     def constant(self, bounds: Interval, name: str) -> Value:
         """An input that is a number or an uncertain parameter; equal numbers have equal keys."""
-        key = ("const", bounds.low) if bounds.is_point else ("input", name)
+        key = self.key("const", bounds.low) if bounds.is_point else self.key("input", name)
         return Value(key, Form(constant=bounds), bounds)
 
     def value(self, name: str, form: Form) -> Value:
         """A named input with a given form."""
-        return Value(("input", name), form, self.range_of(form))
+        return Value(self.key("input", name), form, self.range_of(form))
 
 
 def evaluate(expression: Expression, inputs: Mapping[str, Value], symbols: Symbols) -> list[Value]:
@@ -146,20 +151,20 @@ class _Algebra:
     def __init__(self, symbols: Symbols) -> None:
         self.symbols = symbols
 
-    def _value(self, key: tuple[Any, ...], form: Form, natural: Interval) -> Value:
+    def _value(self, key: int, form: Form, natural: Interval) -> Value:
         return Value(key, form, natural & self.symbols.range_of(form))
 
     def add(self, a: Value, b: Value) -> Value:
-        return self._value(("add", *sorted((a.key, b.key), key=repr)), a.form + b.form, a.range + b.range)
+        return self._value(self.symbols.key("add", *sorted((a.key, b.key))), a.form + b.form, a.range + b.range)
 
     def sub(self, a: Value, b: Value) -> Value:
-        return self._value(("sub", a.key, b.key), a.form - b.form, a.range - b.range)
+        return self._value(self.symbols.key("sub", a.key, b.key), a.form - b.form, a.range - b.range)
 
     def neg(self, a: Value) -> Value:
-        return self._value(("neg", a.key), -a.form, -a.range)
+        return self._value(self.symbols.key("neg", a.key), -a.form, -a.range)
 
     def mul(self, a: Value, b: Value) -> Value:
-        key = ("mul", *sorted((a.key, b.key), key=repr))
+        key = self.symbols.key("mul", *sorted((a.key, b.key)))
         natural = a.range.square() if a.key == b.key else a.range * b.range
         if a.form.is_constant or b.form.is_constant:
             factor, form = (a.form.constant, b.form) if a.form.is_constant else (b.form.constant, a.form)
@@ -168,10 +173,10 @@ class _Algebra:
         return self.symbols.node(key, narrow.form.scaled(wide.range), natural)
 
     def div(self, a: Value, b: Value) -> Value:
-        return self._value(("div", a.key, b.key), a.form.scaled(ONE / b.range), a.range / b.range)
+        return self._value(self.symbols.key("div", a.key, b.key), a.form.scaled(ONE / b.range), a.range / b.range)
 
     def bounded(self, operator: str, a: Value, bounds: Interval) -> Value:
-        return self.symbols.node((operator, a.key), Form(constant=bounds), bounds)
+        return self.symbols.node(self.symbols.key(operator, a.key), Form(constant=bounds), bounds)
 
 
 def tangent(expression: Expression, ranges: Mapping[str, Interval], tangents: Mapping[str, Form]) -> Form:

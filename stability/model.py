@@ -53,9 +53,7 @@ class LoopModel:
     def to_data(self) -> dict[str, Any]:
         """The model as JSON data."""
         return {
-            "rows": [
-                {"state": r.state, "unit": r.unit, "target": r.target, "governed": r.governed} for r in self.rows
-            ],
+            "rows": [{"state": r.state, "unit": r.unit, "target": r.target, "governed": r.governed} for r in self.rows],
             "drives": list(self.drives),
             "inputs": list(self.inputs),
             "plant": self.plant.to_data(),

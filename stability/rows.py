@@ -233,4 +233,3 @@ class _Builder:
         error = self.bounds.period * speed + self.noise[i]
         squares = 0.5 * gains.epsilon * gains.delta * error * (2.0 * self.radii[i] + error)
         return gains.delta * gains.sigma * self.bounds.period * self.theta_rate[i] + squares
-

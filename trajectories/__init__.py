@@ -4,7 +4,7 @@ from .collocation import OBJECTIVES as OBJECTIVES
 from .collocation import Motion as Motion
 from .collocation import Task as Task
 from .collocation import solve as solve
-from .limits import LimitViolated as LimitViolated
+from .limits import LimitViolatedError as LimitViolatedError
 from .limits import MotionLimits as MotionLimits
 from .limits import effort_peaks as effort_peaks
 from .limits import violations as violations

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .limits import Enclosure, LimitViolated, MotionLimits, effort_peaks
+from .limits import Enclosure, LimitViolatedError, MotionLimits, effort_peaks
 from .quintic import quintic, shortest_duration
 from .spline import DEGREE, Spline, clamped_knots
 
@@ -79,7 +79,7 @@ def solve(task: Task, begin: float = 0.0) -> Motion:
         The motion.
 
     Raises:
-        LimitViolated: no motion inside the limits was found.
+        LimitViolatedError: no motion inside the limits was found.
 
     Not guaranteed: global optimality.
     """
@@ -93,7 +93,7 @@ def solve(task: Task, begin: float = 0.0) -> Motion:
             return Motion(spline=spline, cost=cost, effort_peaks=tuple(peaks), rounds=rounds)
         share *= 0.999 / max(peak / limit for peak, limit in zip(peaks, task.effort_limits, strict=True))
     worst = int(np.argmax(np.array(peaks) / np.array(task.effort_limits)))
-    raise LimitViolated(
+    raise LimitViolatedError(
         f"{task.effort_names[worst]} cannot be kept under {task.effort_limits[worst]:g} between the knots: "
         f"{peaks[worst]:.4g} remained; raise the limit or use more spans"
     )
@@ -163,8 +163,10 @@ def _program(task: Task, share: float) -> tuple[Array, float, float]:
     names = ["speed", "acceleration", "jerk", *task.effort_names]
     _refuse(solver, np.array(answer["g"]).ravel(), np.array(upper), names, [len(m) for m in maps[1:]], len(scale), task)
     coefficients = np.concatenate([[task.start] * 3, np.clip(values[:-1], lowest, highest), [task.goal] * 3])
-    cost = float(values[-1]) if not fixed else float(answer["f"]) * max(
-        _energy_scale(task, guess, starts, basis, weights), 1e-9
+    cost = (
+        float(values[-1])
+        if not fixed
+        else float(answer["f"]) * max(_energy_scale(task, guess, starts, basis, weights), 1e-9)
     )
     return coefficients, float(values[-1]), cost
 
@@ -179,8 +181,12 @@ def _refuse(
     if solver.stats()["success"] and excess.max() <= TIGHTENING:
         return
     worst = int(excess.argmax())
-    which = int(np.searchsorted(np.cumsum(counts), worst, side="right")) if worst < motion else 3 + (worst - motion) % efforts
-    raise LimitViolated(
+    which = (
+        int(np.searchsorted(np.cumsum(counts), worst, side="right"))
+        if worst < motion
+        else 3 + (worst - motion) % efforts
+    )
+    raise LimitViolatedError(
         f"no motion from {task.start:g} to {task.goal:g} m within {task.longest:g} s respects the limits: "
         f"{names[which]} would be {100 * max(excess[worst], 0.0):.3g} % over its limit; "
         f"allow more time or raise the {names[which]} limit"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ DEPTH = 10
 Enclosure = Callable[[list[tuple[float, float]]], list[float]]
 
 
-class LimitViolated(Exception):
+class LimitViolatedError(Exception):
     """A reference breaks a limit; the message says which, where, by how much, and what would do."""
 
 
@@ -46,9 +47,16 @@ def violations(spline: Spline, limits: MotionLimits) -> list[str]:
     found = []
     low, high = spline.bounds(0)
     if low < limits.position[0] or high > limits.position[1]:
-        found.append(f"position {low:.4g}…{high:.4g} m leaves the stroke {limits.position[0]:g}…{limits.position[1]:g} m")
+        found.append(
+            f"position {low:.4g}…{high:.4g} m leaves the stroke {limits.position[0]:g}…{limits.position[1]:g} m"
+        )
     for order, (name, limit, unit) in enumerate(
-        (("speed", limits.speed, "m/s"), ("acceleration", limits.acceleration, "m/s^2"), ("jerk", limits.jerk, "m/s^3")), 1
+        (
+            ("speed", limits.speed, "m/s"),
+            ("acceleration", limits.acceleration, "m/s^2"),
+            ("jerk", limits.jerk, "m/s^3"),
+        ),
+        1,
     ):
         size = max(abs(edge) for edge in spline.bounds(order))
         if not size <= limit * (1 + 1e-9):
@@ -84,7 +92,7 @@ def bezier_spans(spline: Spline) -> list[tuple[Array, float]]:
     """Bezier control points and the width of every span. Each shape (6,)."""
     from scipy.interpolate import insert
 
-    tck = (spline.knots, np.append(spline.coefficients, np.zeros(DEGREE + 1)), DEGREE)
+    tck: Any = (spline.knots, np.append(spline.coefficients, np.zeros(DEGREE + 1)), DEGREE)
     edges = np.unique(spline.knots)
     for knot in edges[1:-1]:
         tck = insert(knot, tck, m=DEGREE - 1)

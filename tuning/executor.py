@@ -6,10 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from types import TracebackType
-from typing import Any, TypeVar
-
-T = TypeVar("T")
-R = TypeVar("R")
+from typing import Any
 
 _evaluate: Callable[[Any], Any] | None = None
 
@@ -37,7 +34,7 @@ class Executor:
         jobs: Number of processes; 1 runs here.
     """
 
-    def __init__(self, make: Callable[..., Callable[[T], R]], arguments: tuple[Any, ...], jobs: int = 1) -> None:
+    def __init__(self, make: Callable[..., Callable[[Any], Any]], arguments: tuple[Any, ...], jobs: int = 1) -> None:
         self._local = make(*arguments) if jobs <= 1 else None
         self._pool = None
         if jobs > 1:
@@ -45,11 +42,10 @@ class Executor:
                 jobs, mp_context=get_context("spawn"), initializer=_prepare, initargs=(make, arguments)
             )
 
-    def map(self, items: Sequence[T]) -> list[R]:
+    def map(self, items: Sequence[Any]) -> list[Any]:
         """Results in the order of the items."""
         if self._pool is None:
-            assert self._local is not None
-            return [self._local(item) for item in items]
+            return [self._local(item) for item in items] if self._local else []
         return list(self._pool.map(_call, items))
 
     def __enter__(self) -> Executor:

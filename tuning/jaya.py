@@ -57,7 +57,11 @@ def start(evaluate: Evaluate, first: Array, population: int, seed: int) -> Searc
     candidates = np.clip(np.vstack([first[None, :], around, spread]), 0.0, 1.0)
     outcomes = tuple(evaluate(list(candidates)))
     return SearchState(
-        iteration=0, population=candidates, outcomes=outcomes, random=random.bit_generator.state, evaluations=population
+        iteration=0,
+        population=candidates,
+        outcomes=outcomes,
+        random=dict(random.bit_generator.state),
+        evaluations=population,
     )
 
 
@@ -80,6 +84,6 @@ def step(evaluate: Evaluate, state: SearchState) -> SearchState:
         iteration=state.iteration + 1,
         population=np.where(np.array(better)[:, None], trial, x),
         outcomes=tuple(n if b else o for n, o, b in zip(outcomes, state.outcomes, better, strict=True)),
-        random=random.bit_generator.state,
+        random=dict(random.bit_generator.state),
         evaluations=state.evaluations + len(trial),
     )

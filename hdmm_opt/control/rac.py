@@ -147,7 +147,9 @@ class RAC:
             ca.SX.sym("load", self.plant.w.numel()),
         ]
         names = ["x", "r", "theta", "gains", "nominal", "load"]
-        return ca.Function("rac", symbols, [*self.step(*symbols, period)], names, ["u", "theta_next", "Q"])
+        x, r, theta, gains, nominal, load = symbols
+        results = self.step(x, r, theta, gains, nominal, load, period)
+        return ca.Function("rac", symbols, [*results], names, ["u", "theta_next", "Q"])
 
     def loop_model(self) -> LoopModel:
         """Plant and law as data for the prover."""
@@ -164,9 +166,7 @@ class RAC:
             rows=self.rows,
             drives=plant.drives,
             inputs=plant.inputs,
-            plant=from_casadi(
-                ca.Function("plant", [plant_input], [ca.vertcat(plant.mass, plant.force)]), plant_names
-            ),
+            plant=from_casadi(ca.Function("plant", [plant_input], [ca.vertcat(plant.mass, plant.force)]), plant_names),
             law=tuple(
                 from_casadi(ca.Function("term", [law_input], [term]), law_names)
                 for term in self.terms(plant.x, r, nominal, load)

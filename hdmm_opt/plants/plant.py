@@ -76,7 +76,7 @@ class Plant:
 
     @property
     def rate(self) -> Any:
-        """x' = h / M as a CasADi expression. Shape (n,)."""
+        """X' = h / M as a CasADi expression. Shape (n,)."""
         return self.force / self.mass
 
     def values(self) -> dict[str, float]:
@@ -84,7 +84,7 @@ class Plant:
         return {name: parameter.value for name, parameter in self.parameters.items()}
 
     def at(self, *, x: Any, u: Any, w: Any, p: Any) -> Any:
-        """h with other expressions in place of the symbols. Shape (n,)."""
+        """H with other expressions in place of the symbols. Shape (n,)."""
         import casadi as ca
 
         return ca.substitute([self.force], [self.x, self.u, self.w, self.p], [x, u, w, p])[0]

@@ -109,9 +109,7 @@ def _mechanics(v: Any, torque: Any, load: Any, q: Mapping[str, Any]) -> tuple[An
     return mass, driving / (1 + loss * (r * q["load_mass"] / mass))
 
 
-def _symbols(
-    states: int, inputs: int, known: Mapping[str, Parameter]
-) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+def _symbols(states: int, inputs: int, known: Mapping[str, Parameter]) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
     import casadi as ca
 
     x, u, w = ca.SX.sym("x", states), ca.SX.sym("u", inputs), ca.SX.sym("w", 1)

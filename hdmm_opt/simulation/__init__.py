@@ -5,3 +5,4 @@ from .loop import Trace as Trace
 from .metrics import Metrics as Metrics
 from .metrics import measure as measure
 from .scenario import Scenario as Scenario
+from .scenario import scenarios as scenarios

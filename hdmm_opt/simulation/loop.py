@@ -107,7 +107,7 @@ class ClosedLoop:
         """
         plant = self.law.plant
         count = max(2, round((reference.duration if duration is None else duration) / self.period))
-        t = self.period * np.arange(count)
+        t = np.asarray(self.period * np.arange(count), dtype=np.float64)
         r, load = reference(t), scenario.load_at(t)
         noise = scenario.noise_at(count, np.array(self.noise))
         parameters = np.array([
@@ -138,14 +138,15 @@ class ClosedLoop:
         return float(np.linalg.norm(np.array(wanted(columns, fixed)), axis=0).max())
 
     def _start(self, gains: tuple[Gains, ...], r: Array, scenario: Scenario) -> Array:
-        """States with all errors zero but the first, which the scenario places in its range."""
+        """The start nearest to rest inside the assumed initial errors; the scenario places the first error."""
         plant = self.law.plant
         x = np.zeros(len(plant.states))
         x[0] = r[0] + scenario.initial * self.initial[0]
         columns = np.array(gain_columns(gains)).ravel(order="F")
         for i in range(1, len(x)):
             now = np.concatenate([x, r, np.zeros(len(gains))])
-            x[i] = float(np.array(self._law()["targets"](now, columns)).ravel()[i])
+            target = float(np.array(self._law()["targets"](now, columns)).ravel()[i])
+            x[i] = target + min(max(-target, -self.initial[i]), self.initial[i])
         return x
 
     def _law(self) -> dict[str, Any]:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ..study import Study
+
 Array = NDArray[np.float64]
 
 
@@ -40,3 +42,14 @@ class Scenario:
         """Measurement errors. Shape (n, count)."""
         draws = np.random.default_rng(self.seed).uniform(-1.0, 1.0, (bounds.size, count))
         return self.noise * bounds[:, None] * draws
+
+
+def scenarios(study: Study) -> list[Scenario]:
+    """The scenarios of a study."""
+    return [
+        Scenario(
+            name=s.name, load=s.load_n, parameters=s.parameters, noise=s.noise, initial=s.initial,
+            seed=study.tuning.seed + k,
+        )
+        for k, s in enumerate(study.validation.scenarios)
+    ]  # fmt: skip

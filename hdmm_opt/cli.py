@@ -1,0 +1,116 @@
+"""The command line: each verb parses, calls one function, and returns an exit status.
+
+0 proved or done, 1 not proved or a requirement missed, 2 misuse or unreadable input, 130 interrupted. Human text goes
+to stderr, results to stdout. Heavy libraries are imported inside the verbs.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+PROVED, NOT_PROVED, MISUSE, INTERRUPTED = 0, 1, 2, 130
+
+
+class _Group(click.Group):
+    """Turns bad input into one line and exit status 2, and Ctrl-C into 130."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        from .errors import InvalidInputError
+
+        try:
+            return super().invoke(ctx)
+        except InvalidInputError as error:
+            click.echo(f"hdmm-opt: {error}", err=True)
+            sys.exit(MISUSE)
+        except (KeyboardInterrupt, click.Abort):
+            click.echo("hdmm-opt: interrupted; nothing half-written, go on with --resume", err=True)
+            sys.exit(INTERRUPTED)
+
+
+@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="hdmm-opt")
+def main() -> None:
+    r"""Design controllers for heavy-duty mobile machines, with proofs that anyone can re-check.
+
+    \b
+    Start with:  hdmm-opt studies
+                 hdmm-opt design emla-p2
+                 hdmm-opt check emla-p2.gains.json
+    """
+
+
+@main.command()
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def studies(as_json: bool) -> None:
+    """List the bundled studies: name, machine, law, what it shows."""
+    from .study import bundled, load
+
+    rows = []
+    for name in bundled():
+        study = load(name)
+        law = study.controller.law + (" model-based" if study.controller.modelling else " model-free")
+        rows.append({
+            "name": name, "machine": f"{study.plant.model} ({study.plant.level})",
+            "law": f"{law}, {study.controller.rate_hz:g} Hz", "shows": study.study.summary,
+        })  # fmt: skip
+    if as_json:
+        click.echo(json.dumps(rows, indent=1))
+        return
+    widths = {key: max(len(row[key]) for row in rows) for key in ("name", "machine", "law")}
+    for row in rows:
+        click.echo("  ".join(row[key].ljust(width) for key, width in widths.items()) + "  " + row["shows"])
+
+
+@main.command()
+@click.argument("study")
+@click.option("-o", "output", type=click.Path(path_type=Path), help="Gain file to write; STUDY.gains.json by default.")
+@click.option("--report", type=click.Path(path_type=Path, file_okay=False), help="Folder for an HTML report.")
+@click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Processes for the search.")
+@click.option("--seed", type=click.IntRange(0), help="Seed of the search; that of the study by default.")
+@click.option("--resume", is_flag=True, help="Go on with an interrupted search.")
+@click.option("--budget", type=click.Choice(["quick", "full"]), default="quick", show_default=True,
+              help="quick: as the study says; full: population 50, 100 iterations, 1000 Monte Carlo runs.")  # fmt: skip
+def design(
+    study: str, output: Path | None, report: Path | None, jobs: int, seed: int | None, resume: bool, budget: str
+) -> None:
+    """Design gains for STUDY, a bundled name or a TOML file: reference, gains, proof, validation, gain file."""
+    from .commands import run_design
+
+    sys.exit(run_design(study, output, report, jobs=jobs, seed=seed, resume=resume, full=budget == "full"))
+
+
+@main.command()
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
+@click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
+def check(files: tuple[Path, ...], as_json: bool) -> None:
+    """Re-prove gain files from the files alone, in exact arithmetic. Nothing that a file says of itself is believed."""
+    from stability import checker
+
+    sys.exit(checker.main([*map(str, files), *(["--json"] if as_json else [])]))
+
+
+@main.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--scenario", help="One scenario: a name of the study, worst-case, or witness (of a refusal).")
+@click.option("--csv", "csv_path", type=click.Path(path_type=Path), help="Write the signals of one scenario as CSV.")
+@click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
+def simulate(file: Path, scenario: str | None, csv_path: Path | None, as_json: bool) -> None:
+    """Simulate the closed loop with the gains of FILE (a gain file, or what a refusal left behind)."""
+    from .commands import run_simulate
+
+    sys.exit(run_simulate(file, scenario, csv_path, as_json))
+
+
+@main.command()
+@click.argument("study")
+@click.option("-o", "output", type=click.Path(path_type=Path), help="Write the reference as JSON.")
+def trajectory(study: str, output: Path | None) -> None:
+    """Build the reference of STUDY alone, and show the limits that it respects."""
+    from .commands import run_trajectory
+
+    sys.exit(run_trajectory(study, output))

@@ -1,0 +1,176 @@
+"""What the verbs do: plain functions that print and return an exit status."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import asdict, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import click
+
+from . import gain_file, pipeline, study, validation
+from .cli import NOT_PROVED, PROVED
+from .errors import InvalidInputError
+from .gain_file import gains_of, reference_of, write_text
+from .problem import Problem, assemble, study_of
+from .progress import bar
+from .simulation import ClosedLoop, Metrics, Scenario, Trace, scenarios
+
+
+def run_design(
+    name: str, output: Path | None, report: Path | None, *, jobs: int, seed: int | None, resume: bool, full: bool
+) -> int:
+    """`hdmm-opt design`."""
+    chosen = study.load(name)
+    target = Path(f"{chosen.study.name}.gains.json") if output is None else output
+    rejected = target.with_name(target.name.removesuffix(".json").removesuffix(".gains") + ".rejected.json")
+    state = target.with_name(f".{target.name}.state")
+    gain_file.check_writable(target)
+    if report is not None:
+        _prepare_folder(report)
+    options = pipeline.Options(seed=seed, jobs=jobs, full=full, state=state, resume=resume)
+    with bar() as progress:
+        result = pipeline.design(chosen, options, progress)
+    state.unlink(missing_ok=True)
+    if result.document is None:
+        write_text(rejected, gain_file.to_text(pipeline.rejected_document(chosen, result)))
+        _explain(chosen.study.name, result, rejected)
+        return NOT_PROVED
+    write_text(target, gain_file.to_text(result.document))
+    rejected.unlink(missing_ok=True)
+    _summary(result)
+    if report is not None:
+        from .report import write_report
+
+        click.echo(f"report: {write_report(result.document, report)}", err=True)
+    click.echo(str(target))
+    return PROVED
+
+
+def _prepare_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"{folder}: cannot make that folder: {error.strerror}; choose another") from None
+    gain_file.check_writable(folder / "report.html")
+
+
+def _explain(name: str, result: pipeline.Design, left: Path) -> None:
+    """Say what failed, by how much, and what would do."""
+    click.echo(f"{name}: not proved, no gain file written", err=True)
+    for verdict in result.verdicts:
+        click.echo(f"  {verdict.verdict}: {verdict.name} (margin {verdict.margin:.4g} {verdict.unit})", err=True)
+        click.echo(f"    {verdict.statement}", err=True)
+        if verdict.remedy:
+            click.echo(f"    would pass: {verdict.remedy}", err=True)
+    for line in result.missed[:5]:
+        click.echo(f"  requirement missed: {line}", err=True)
+    click.echo(f"  details: {left}", err=True)
+
+
+def _summary(result: pipeline.Design) -> None:
+    document, report = result.document, result.report
+    assert document is not None and report is not None
+    click.echo(report.message, err=True)
+    for o in report.obligations:
+        click.echo(f"  {o.verdict:8} {o.name:12} margin {o.margin:.4g} {o.unit}: {o.statement}", err=True)
+    shown = document["validation"]
+    certified = float(Fraction(document["certificate"]["envelope"]["ball"][0]))
+    late, ratio = shown["largest_error_after_transient_m"], shown["bound_over_simulated"]
+    click.echo(
+        f"certified error {certified * 1e3:.4g} mm, largest simulated {late * 1e3:.4g} mm over scenarios, corners and "
+        f"draws: ratio {ratio:.3g}",
+        err=True,
+    )
+    for row in shown["requirements"]:
+        click.echo(f"  {row['name']}: required {row['required']:g}, simulated {row['simulated']:.4g}", err=True)
+    assumed = [k for k, p in document["study"]["plant"]["parameters"].items() if p["source"] == "assumed"]
+    click.echo(f"assumed parameters, to be replaced by yours: {', '.join(assumed)}", err=True)
+
+
+def run_simulate(path: Path, name: str | None, csv_path: Path | None, as_json: bool) -> int:
+    """`hdmm-opt simulate`."""
+    problem, gains, offered = _from_file(path)
+    if name is not None and name not in offered:
+        raise InvalidInputError(f'{path}: no scenario "{name}"; {study.nearest(name, offered)}')
+    chosen = [name] if name is not None else list(offered)
+    if csv_path is not None:
+        if len(chosen) > 1:
+            raise InvalidInputError(f"--csv writes one scenario; choose one with --scenario: {', '.join(offered)}")
+        gain_file.check_writable(csv_path)
+    results: dict[str, Metrics] = {}
+    for key in chosen:
+        loop, scenario = offered[key]
+        trace = loop.run(gains, problem.reference, scenario)
+        results[key] = validation.figures(problem, trace)
+        if csv_path is not None:
+            write_text(csv_path, _csv(problem, trace))
+    if as_json:
+        click.echo(json.dumps({key: asdict(metrics) for key, metrics in results.items()}, indent=1))
+    else:
+        for key, metrics in results.items():
+            click.echo(key)
+            for field, value in asdict(metrics).items():
+                click.echo(f"  {field:18} {value:.6g}" if not isinstance(value, bool) else f"  {field:18} {value}")
+    missed = [text for key, m in results.items() for text in validation.missed(problem.study, key, m)]
+    for line in missed:
+        click.echo(f"requirement missed: {line}", err=True)
+    return NOT_PROVED if missed else PROVED
+
+
+def _from_file(path: Path) -> tuple[Problem, tuple[Any, ...], dict[str, tuple[ClosedLoop, Scenario]]]:
+    """The problem, the gains and the scenarios that a gain file or a rejected file offers."""
+    document = gain_file.read(path)
+    problem = assemble(study_of(document["study"]), reference_of(document) if "reference" in document else None)
+    offered = {s.name: (problem.loop, s) for s in scenarios(problem.study)}
+    worst = document.get("validation", {}).get("worst_case")
+    if worst:
+        offered["worst-case"] = (problem.loop, _scenario(worst["scenario"]))
+    for entry in document["obligations"]:
+        if entry.get("witness"):
+            loop = replace(problem.loop, period=1 / float(entry["witness"]["rate_hz"]), _compiled={})
+            offered["witness"] = (loop, _scenario(entry["witness"]["scenario"]))
+    return problem, gains_of(document), offered
+
+
+def _scenario(data: dict[str, Any]) -> Scenario:
+    return Scenario(**{**data, "load": tuple((float(t), float(f)) for t, f in data["load"])})
+
+
+def _csv(problem: Problem, trace: Trace) -> str:
+    """Signals as CSV, one row a control instant; the header carries the units."""
+    plant = problem.plant
+    columns: dict[str, Any] = {"time [s]": trace.t, "load [N]": trace.load, "error [m]": trace.error}
+    for k, name in enumerate(("position", "speed", "acceleration", "jerk")):
+        columns[f"reference {name} [{('m', 'm/s', 'm/s^2', 'm/s^3')[k]}]"] = trace.r[k]
+    columns |= {f"{s} [{u}]": row for s, u, row in zip(plant.states, plant.state_units, trace.x, strict=True)}
+    columns |= {f"{s} [{plant.input_unit}]": row for s, row in zip(plant.inputs, trace.u, strict=True)}
+    columns |= {f"theta_{k + 1}": row for k, row in enumerate(trace.theta)}
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+    return text.getvalue()
+
+
+def run_trajectory(name: str, output: Path | None) -> int:
+    """`hdmm-opt trajectory`."""
+    from .motion import effort_table
+
+    chosen = study.load(name)
+    if output is not None:
+        gain_file.check_writable(output)
+    problem = assemble(chosen)
+    moves = sum(1 for s in problem.reference.segments if s.coefficients.min() < s.coefficients.max())
+    click.echo(f"{chosen.study.name}: {moves} moves ({chosen.reference.kind}), {problem.reference.duration:.4g} s")
+    for row in effort_table(chosen, problem.plant, problem.reference):
+        limit = "no limit" if row["limit"] is None else f"limit {row['limit']:g}"
+        click.echo(f"  {row['quantity']:13} {row['peak']:10.4g} {row['unit']:6} {limit}")
+    if output is not None:
+        write_text(output, gain_file.to_text(gain_file.reference_data(problem.reference)))
+        click.echo(str(output))
+    return PROVED
