@@ -35,12 +35,9 @@ class _Group(click.Group):
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(package_name="hdmm-opt")
 def main() -> None:
-    r"""Design controllers for heavy-duty mobile machines, with proofs that anyone can re-check.
+    """Design controllers for heavy-duty mobile machines, with proofs that anyone can re-check.
 
-    \b
-    Start with:  hdmm-opt studies
-                 hdmm-opt design emla-p2
-                 hdmm-opt check emla-p2.gains.json
+    Start with "hdmm-opt studies", then "hdmm-opt design emla-p2", then "hdmm-opt check emla-p2.gains.json".
     """
 
 

@@ -27,9 +27,9 @@ def run_design(
     """`hdmm-opt design`."""
     chosen = study.load(name)
     target = Path(f"{chosen.study.name}.gains.json") if output is None else output
+    gain_file.check_writable(target)
     rejected = target.with_name(target.name.removesuffix(".json").removesuffix(".gains") + ".rejected.json")
     state = target.with_name(f".{target.name}.state")
-    gain_file.check_writable(target)
     if report is not None:
         _prepare_folder(report)
     options = pipeline.Options(seed=seed, jobs=jobs, full=full, state=state, resume=resume)

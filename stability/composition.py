@@ -111,7 +111,8 @@ class _Search:
         self.adaptive &= self.epsilon > 0
 
     def run(self) -> Composition | Failure:
-        radii = np.maximum(self.initial, 1e-3 * self.limit)
+        radii = np.maximum(self.initial, 1e-9 * self.limit)
+        scales = self._scales()
         held = np.zeros(len(self.model.inputs))
         decay: float | None = None
         for step in range(self.STEPS):
@@ -119,7 +120,6 @@ class _Search:
                 rows = error_rows(self.model, self.bounds, self.gains, radii, held)
             except (ZeroDivisionError, ValueError) as error:
                 return Failure(reason=f"the model cannot be bounded over the box: {error}")
-            scales = _scales(rows, radii)
             if decay is None or step % 6 == 5:
                 decay = self._best_decay(rows, scales, decay)
             found = None if decay is None else self._solve(rows, scales, decay)
@@ -143,6 +143,18 @@ class _Search:
             radii = np.where(needed * ROOM <= radii, radii, needed * WIDENING)
             held = np.where(rows.held * ROOM <= held, held, rows.held * WIDENING)
         return Failure(reason=f"the box did not settle in {self.STEPS} iterations", needed=radii)
+
+    def _scales(self) -> Array:
+        """Unit of each error in which the program is well conditioned: each row's is that of its target times ½β."""
+        gains = dict(zip(self.model.governed, self.gains, strict=True))
+        scales: list[float] = []
+        for row in self.model.rows:
+            if isinstance(row.target, int):
+                scales.append(scales[row.target] * gains[row.target].beta / 2)
+            else:
+                same = [k for k, other in enumerate(self.model.rows[: len(scales)]) if other.unit == row.unit]
+                scales.append(scales[same[-1]] if same else 1.0)
+        return np.array(scales)
 
     def _best_decay(self, rows: ErrorRows, scales: Array, previous: float | None) -> float | None:
         """Line search over μ for the smallest ultimate bound; geometric, then golden."""
@@ -215,11 +227,6 @@ def initial_level(rows: ErrorRows, found: Any, initial: Array, epsilon: Array, d
     star = np.divide(found.leak, epsilon, out=np.zeros_like(epsilon), where=epsilon > 0)
     adaptive = found.weights * rows.control_gain * star**2 / (2 * np.where(on, delta, 1.0))
     return float((0.5 * found.weights * rows.mass_high * initial**2).sum() + adaptive[on].sum())
-
-
-def _scales(rows: ErrorRows, radii: Array) -> Array:
-    """Unit of each error in which the program is well conditioned."""
-    return radii / radii[0]
 
 
 def _weakest(rows: ErrorRows) -> int:

@@ -62,6 +62,8 @@ class Interval:
 
     def __mul__(self, other: Interval) -> Interval:
         ends = (self.low * other.low, self.low * other.high, self.high * other.low, self.high * other.high)
+        if any(end != end for end in ends):  # 0 times infinity: the member 0 makes it 0
+            ends = tuple(0.0 if end != end else end for end in ends)
         return Interval(_down(min(ends)), _up(max(ends)))
 
     def __truediv__(self, other: Interval) -> Interval:
@@ -93,6 +95,12 @@ class Interval:
         for _ in range(4):
             low, high = _down(low), _up(high)
         return Interval(max(-1.0, low), min(1.0, high))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Interval) and (self.low, self.high) == (other.low, other.high)
+
+    def __hash__(self) -> int:
+        return hash((self.low, self.high))
 
     def __repr__(self) -> str:
         return f"[{self.low:g}, {self.high:g}]"

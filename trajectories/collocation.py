@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 OBJECTIVES = ("time", "energy")
 #: Collocation points in each span at which the effort limits are imposed.
 POINTS = 3
+#: A motion longer than this, s, is not searched for.
+LONGEST = 1e4
 #: Every limit is kept smaller by this share in the program, so that what the solver's tolerance leaves is inside.
 TIGHTENING = 1e-4
 
@@ -83,6 +85,10 @@ def solve(task: Task, begin: float = 0.0) -> Motion:
 
     Not guaranteed: global optimality.
     """
+    low, high = task.limits.position
+    for point in (task.start, task.goal):
+        if not low <= point <= high:
+            raise LimitViolatedError(f"position {point:g} m leaves the stroke {low:g}…{high:g} m; move the waypoint")
     share = 1.0
     peaks: list[float] = []
     for rounds in range(1, 6):
@@ -154,7 +160,7 @@ def _program(task: Task, share: float) -> tuple[Array, float, float]:
     )  # fmt: skip
     answer = solver(
         x0=np.append(starts[3:-3], guess),
-        lbx=[lowest] * (count - 6) + [task.longest if fixed else 0.05 * quickest],
+        lbx=[lowest] * (count - 6) + [task.longest if fixed else min(0.05 * quickest, 0.5 * task.longest)],
         ubx=[highest] * (count - 6) + [task.longest],
         lbg=lower_constraints,
         ubg=upper,
@@ -175,11 +181,17 @@ def _refuse(
     solver: Any, values: Array, upper: Array, names: list[str], counts: list[int], efforts: int, task: Task
 ) -> None:
     """Raise with the most violated limit unless every constraint of the program holds."""
-    excess = np.maximum(values - upper, -1.0 - values if values.size == 0 else values - upper)
-    motion = sum(counts)
+    excess, motion = values - upper, sum(counts)
     excess[:motion] = np.abs(values[:motion]) - 1.0
     if solver.stats()["success"] and excess.max() <= TIGHTENING:
         return
+    if task.longest < LONGEST:
+        shortest = _shortest(task)
+        if shortest is not None and shortest > task.longest:
+            raise LimitViolatedError(
+                f"no motion from {task.start:g} to {task.goal:g} m within {task.longest:g} s respects the limits; "
+                f"{1.001 * shortest:.4g} s would do"
+            )
     worst = int(excess.argmax())
     which = (
         int(np.searchsorted(np.cumsum(counts), worst, side="right"))
@@ -191,6 +203,14 @@ def _refuse(
         f"{names[which]} would be {100 * max(excess[worst], 0.0):.3g} % over its limit; "
         f"allow more time or raise the {names[which]} limit"
     )
+
+
+def _shortest(task: Task) -> float | None:
+    """Duration of the quickest motion inside the limits, s; None where there is none."""
+    try:
+        return solve(replace(task, objective="time", longest=LONGEST)).spline.end
+    except LimitViolatedError:
+        return None
 
 
 def _initial(task: Task, count: int) -> Array:

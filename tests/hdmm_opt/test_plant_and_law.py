@@ -1,0 +1,155 @@
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hdmm_opt.control import MODELLING, RAC
+from hdmm_opt.plants import SOURCES, defaults, effort, pmsm_emla
+from hdmm_opt.plants import pmsm_emla as build
+from hdmm_opt.plants.parameter import Parameter
+from hdmm_opt.plants.pmsm_emla import MAXIMUM_SPEED, PEAK_CURRENT, PHASE_VOLTAGE, RATED_CURRENT, TORQUE_CONSTANT
+
+
+def rate(plant, x, u, w, **changes):
+    values = [changes.get(name, p.value) for name, p in plant.parameters.items()]
+    function = ca.Function("f", [plant.x, plant.u, plant.w, plant.p], [plant.rate])
+    return np.array(function(x, u, w, values)).ravel()
+
+
+def test_figures_of_the_machine_follow_from_its_table():
+    """Torques at rated and peak current, speed at 3000 rpm, EMF against the bus of a 380 V drive (machines.md)."""
+    assert TORQUE_CONSTANT * RATED_CURRENT == pytest.approx(37.1, abs=0.1)
+    assert TORQUE_CONSTANT * PEAK_CURRENT == pytest.approx(77.5, abs=0.1)
+    r = defaults("torque")["transmission"].value
+    assert r == pytest.approx(3.307e-4, rel=1e-4)
+    assert 3000 * 2 * math.pi / 60 * r == pytest.approx(0.104, abs=2e-4)
+    emf = 4 * 0.134 * math.sqrt(2) * 3000 * 2 * math.pi / 60
+    assert emf == pytest.approx(238, abs=1)
+    at_top = 4 * 0.134 * math.sqrt(2) * (MAXIMUM_SPEED / r) * math.sqrt(3)
+    assert at_top == pytest.approx(533, abs=2) and PHASE_VOLTAGE * math.sqrt(3) == pytest.approx(380 * math.sqrt(2))
+    assert 75e3 * r == pytest.approx(24.8, abs=0.05) and 75e3 * r / 0.8 == pytest.approx(31.0, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("friction", "driving", "back"), [(0.003, 0.963, 0.962), (0.005, 0.941, 0.937), (0.01, 0.888, 0.874)]
+)
+def test_screw_efficiency_in_both_directions(friction, driving, back):
+    """Steady torque per ideal torque, all other friction off."""
+    parameters = {
+        name: Parameter(value=value, unit=defaults("torque")[name].unit)
+        for name, value in (
+            ("screw_friction", friction),
+            ("gear_loss", 1e-12),
+            ("viscous_friction", 1e-12),
+            ("coulomb_friction", 1e-9),
+        )
+    }
+    plant = pmsm_emla("torque", parameters)
+    r = plant.parameters["transmission"].value
+    for speed, efficiency in ((0.05, driving), (-0.05, back)):
+        demand = plant.demand(1, 0, x=ca.SX([0.2, speed, 0]), w=ca.SX([50e3]), p=ca.SX(list(plant.values().values())))
+        torque = float(ca.evalf(ca.SX(demand)))
+        ideal = 50e3 * r
+        assert (ideal / torque if speed > 0 else torque / ideal) == pytest.approx(efficiency, abs=1e-3)
+
+
+def test_energy_balance_of_the_electrical_part():
+    """Electrical power = copper loss + rate of magnetic energy + mechanical power."""
+    plant = build("voltage")
+    q = plant.values()
+    x, u = [0.2, 0.06, 21.0, -7.0], [180.0, -35.0]
+    change = rate(plant, x, u, [60e3])
+    speed = x[1] / q["transmission"]
+    electrical = 1.5 * (u[0] * x[2] + u[1] * x[3])
+    copper = 1.5 * q["resistance"] * (x[2] ** 2 + x[3] ** 2)
+    magnetic = 1.5 * q["inductance"] * (x[2] * change[2] + x[3] * change[3])
+    mechanical = 1.5 * 4 * q["flux"] * x[2] * speed
+    assert electrical == pytest.approx(copper + magnetic + mechanical, rel=1e-12)
+
+
+def test_i_d_couples_against_the_strict_feedback_order():
+    plant = build("voltage")
+    jacobian = ca.Function("J", [plant.x, plant.u, plant.w, plant.p], [ca.jacobian(plant.rate, plant.x)])
+    entries = np.array(jacobian([0.2, 0.06, 20, 5], [0, 0], 5e4, list(plant.values().values())))
+    assert entries[2, 3] != 0 and entries[3, 2] != 0
+
+
+@pytest.mark.parametrize("level", ["torque", "voltage"])
+def test_every_parameter_says_what_it_is(level):
+    for name, parameter in defaults(level).items():
+        assert parameter.meaning and parameter.unit and parameter.source in SOURCES, name
+        assert 0 <= parameter.tolerance < 1
+
+
+def hand_written(x, r, theta, gains, period, limit):
+    """An independent RAC of two subsystems without modelling terms."""
+    q1 = x[0] - r[0]
+    k1 = -0.5 * (gains[0][0] + gains[0][1] * theta[0]) * q1 + r[1]
+    q2 = x[1] - k1
+    u = -0.5 * (gains[1][0] + gains[1][1] * theta[1]) * q2
+    after = [
+        t + period * (-g[2] * g[3] * t + 0.5 * g[1] * g[2] * q * q)
+        for t, g, q in zip(theta, gains, (q1, q2), strict=True)
+    ]
+    return max(-limit, min(limit, u)), after
+
+
+positive = st.floats(0.01, 100)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.floats(-0.1, 0.1), min_size=3, max_size=3),
+    st.lists(st.floats(-0.1, 0.1), min_size=4, max_size=4),
+    st.lists(st.floats(0, 5), min_size=2, max_size=2),
+    st.lists(st.lists(positive, min_size=4, max_size=4), min_size=2, max_size=2),
+)
+def test_the_step_is_the_law(x, r, theta, gains):
+    law = RAC(plant=build("torque"))
+    step = law.step_function(1e-4)
+    nominal = list(law.plant.values().values())
+    u, after, _ = step(x, r, theta, np.array(gains), nominal, 0.0)
+    expected, adapted = hand_written(x, r, theta, gains, 1e-4, 77.0)
+    assert float(u) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    assert np.array(after).ravel() == pytest.approx(adapted, rel=1e-12, abs=1e-15)
+    if all(1e-4 * g[2] * g[3] <= 1 for g in gains):
+        assert (np.array(after) >= 0).all()
+
+
+def test_the_amplitude_limit_scales_the_vector():
+    law = RAC(plant=build("voltage"))
+    step = law.step_function(1e-4)
+    gains = np.array([[30, 0, 1, 1], [6000, 0, 1, 1], [90, 0, 1, 1], [90, 0, 1, 1]], dtype=float)
+    x = [0.21, 0.0, 10.0, 30.0]
+    u = np.array(step(x, [0.2, 0, 0, 0], [0] * 4, gains, list(law.plant.values().values()), 0.0)[0]).ravel()
+    assert np.linalg.norm(u) == pytest.approx(PHASE_VOLTAGE) and u[0] * u[1] != 0
+
+
+def test_modelling_terms_cancel_the_plant_at_nominal_values():
+    """With all electrical terms, L i' = -½β Q exactly; with mechanics, x'' equals the reference's at zero error."""
+    law = RAC(plant=build("voltage"), modelling=("mechanics", "resistance", "back_emf", "decoupling"))
+    nominal = ca.DM(list(law.plant.values().values()))
+    x, r, load = ca.DM([0.2, 0.05, 22.0, -3.0]), ca.DM([0.2, 0.05, 0.1, 0.3]), ca.DM([60e3])
+    terms = [float(ca.evalf(ca.SX(t))) for t in law.terms(ca.SX(x), ca.SX(r), ca.SX(nominal), ca.SX(load))]
+    electrical = rate(law.plant, x, [terms[2], terms[3]], load)[2:]
+    assert electrical == pytest.approx([0, 0], abs=1e-9)
+    mechanical = rate(law.plant, ca.DM([0.2, 0.05, terms[1], 0.0]), [0, 0], load)[1]
+    assert mechanical == pytest.approx(0.1, rel=1e-12)
+    assert terms[0] == pytest.approx(0.05)
+
+
+def test_terms_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError, match="knows mechanics"):
+        RAC(plant=build("torque"), modelling=("thermal",))
+    with pytest.raises(ValueError, match="leave the term out"):
+        RAC(plant=build("torque"), modelling=("back_emf",))
+    assert set(MODELLING) == {"mechanics", "resistance", "back_emf", "decoupling"}
+
+
+def test_effort_is_the_inverse_of_the_plant():
+    plant = build("torque")
+    torque = np.array(effort(plant, 60e3)(0.2, 0.05, 0.2, 0.0)[0]).ravel()[0]
+    assert rate(plant, [0.2, 0.05, torque], [0], [60e3])[1] == pytest.approx(0.2, rel=1e-12)

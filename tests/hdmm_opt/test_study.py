@@ -1,0 +1,89 @@
+"""Bad input: one line that says the rule, what came, and what would do."""
+
+import re
+
+import pytest
+
+from hdmm_opt import study
+from hdmm_opt.errors import InvalidInputError
+from hdmm_opt.problem import assemble, resolved, study_of
+
+from importlib import resources  # isort: skip
+
+
+def text(name="emla-p2"):
+    return (resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def refusal(changed):
+    with pytest.raises(InvalidInputError) as caught:
+        assemble(study.parse(changed, "mine.toml"))
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+def swapped(old, new, name="emla-p2"):
+    assert old in text(name)
+    return text(name).replace(old, new, 1)
+
+
+@pytest.mark.parametrize("name", study.bundled())
+def test_bundled_studies_are_valid_and_survive_the_round_trip(name):
+    loaded = study.load(name)
+    assert loaded.study.name == name and loaded.study.summary
+    problem = assemble(loaded)
+    again = assemble(study_of(resolved(problem)))
+    assert resolved(again) == resolved(problem)
+    assert again.bounds == problem.bounds
+
+
+CASES = {
+    "broken TOML": (lambda: text() + "\n[oops", "not valid TOML"),
+    "unknown key": (lambda: swapped("rate_hz", "rate_hs"), 'unknown key "controller.rate_hs"; did you mean "rate_hz"?'),
+    "unknown section": (lambda: swapped("[tuning]", "[tunning]"), 'did you mean "tuning"?'),
+    "unknown parameter": (lambda: swapped("parameters.motor_inertia", "parameters.motor_inertja"), 'did you mean "motor_inertia"?'),
+    "unknown gain": (lambda: swapped("beta_2", "beta_3"), 'did you mean "beta_'),
+    "unknown noise": (lambda: swapped("position_m = 1e-6", "position_mm = 1e-3"), 'did you mean "position_m"?'),
+    "wrong unit": (lambda: swapped('unit = "kg m^2"', 'unit = "g cm^2"'), 'must be "kg m^2": got "g cm^2"; convert the value'),
+    "NaN": (lambda: swapped("value = 0.012", "value = nan"), "must be a finite number: got nan"),
+    "infinity": (lambda: swapped("speed_m_s = 0.104", "speed_m_s = inf"), "must be a finite number: got inf"),
+    "lower over upper": (lambda: swapped("[65e3, 76e3]", "[76e3, 65e3]"), "needs lower <= upper: got [76000, 65000]"),
+    "empty range": (lambda: swapped("[65e3, 76e3]", "[65e3, 65e3]"), "empty range"),
+    "empty gain range": (lambda: swapped("min = 8.0, max = 60.0", "min = 8.0, max = 8.0"), "empty range"),
+    "negative mass": (lambda: swapped("value = 2000.0", "value = -2000.0"), "must be positive: got -2000"),
+    "rate of zero": (lambda: swapped("rate_hz = 1000", "rate_hz = 0"), "must be greater than 0: got 0"),
+    "negative tolerance": (lambda: swapped("tolerance = 0.1", "tolerance = -0.1"), "greater than or equal to 0"),
+    "unknown source": (lambda: swapped('source = "assumed"', 'source = "internet"'), "must be 'table', 'derived', 'public' or 'assumed'"),
+    "missing key": (lambda: swapped("rate_hz = 1000\n", ""), '"controller.rate_hz" is required and missing'),
+    "missing gain": (lambda: swapped("beta_2 = { min = 1500.0, max = 15000.0 }\n", ""), "beta_2"),
+    "gain both ways": (lambda: swapped("min = 8.0, max = 60.0", "min = 8.0, max = 60.0, value = 9.0"), "either value, or min and max"),
+    "wrong type": (lambda: swapped("rate_hz = 1000", 'rate_hz = "fast"'), "valid number"),
+    "unreachable speed": (lambda: swapped("durations_s = [7.0, 7.0]", "durations_s = [4.0, 7.0]"), "s would do"),
+    "unreachable stroke": (lambda: swapped("[0.1, 0.4, 0.1]", "[0.1, 0.9, 0.1]"), "leaves the stroke"),
+    "unreachable torque": (lambda: swapped("torque_nm = 37.0", "torque_nm = 20.0"), "the limit is 20"),
+    "missing duration": (lambda: swapped("durations_s = [7.0, 7.0]", "durations_s = [7.0]"), "each of the 2 moves: got 1"),
+    "same waypoint": (lambda: swapped("[0.1, 0.4, 0.1]", "[0.1, 0.1, 0.4]"), "differ"),
+    "load outside": (lambda: swapped("[[0.0, 76e3]]", "[[0.0, 80e3]]"), "got 80000"),
+    "times out of order": (lambda: swapped("[4.001, 76e3]", "[3.0, 76e3]"), "increasing times"),
+    "term of another level": (lambda: swapped("modelling = []", 'modelling = ["back_emf"]'), "leave the term out"),
+    "bad name": (lambda: swapped('name = "emla-p2"', 'name = "../evil"'), "study.name"),
+    "unreachable spline": (lambda: swapped("longest_s = 20.0", "longest_s = 2.0", "emla-p4-fast"), "s would do"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_input_is_one_helpful_line(case):
+    make, expected = CASES[case]
+    message = refusal(make())
+    assert expected in message, message
+    assert re.match(r"(mine\.toml|reference|controller|unknown key|\"controller|controller)", message)
+
+
+def test_a_missing_file_or_name():
+    for name in ("emla-p3", "nowhere.toml"):
+        with pytest.raises(InvalidInputError) as caught:
+            study.load(name)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(InvalidInputError, match='did you mean "emla-p2"'):
+        study.load("emlap2")

@@ -1,0 +1,307 @@
+"""The checker refuses: every change to a proved file, careless or careful, loses the verdict."""
+
+import json
+import shutil
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from stability import checker
+
+
+def status(text):
+    return checker.check_text(text).status
+
+
+def test_the_committed_file_is_proved_by_the_checker_alone(tmp_path, gain_text):
+    """A bare interpreter, an empty folder, the checker and nothing else."""
+    shutil.copy(Path(checker.__file__), tmp_path / "checker.py")
+    good, bad = tmp_path / "good.json", tmp_path / "bad.json"
+    good.write_text(gain_text, encoding="utf-8")
+    bad.write_text(gain_text.replace("0.012", "0.013", 1), encoding="utf-8")
+
+    def alone(*files):
+        command = [sys.executable, "-I", "-S", "checker.py", *files]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    proved = alone("good.json")
+    assert proved.returncode == 0 and "proved" in proved.stdout and not proved.stderr
+    assert alone("bad.json").returncode == 2
+    assert alone("missing.json").returncode == 2
+    rows = json.loads(alone("good.json", "--json").stdout)
+    assert [o["name"] for o in rows[0]["obligations"]] == list(checker.REQUIRED["rac"])
+
+
+def walk(node, path=()):
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield from walk(value, (*path, key))
+    elif isinstance(node, list):
+        for index, value in enumerate(node):
+            yield from walk(value, (*path, index))
+    else:
+        yield path, node
+
+
+def put(node, path, value):
+    for key in path[:-1]:
+        node = node[key]
+    node[path[-1]] = value
+
+
+def one_digit(value):
+    """The same number or text with its last significant digit changed."""
+    text = repr(value) if isinstance(value, float | int) else value
+    for place in range(len(text) - 1, -1, -1):
+        if text[place].isdigit():
+            changed = text[:place] + str((int(text[place]) + 1) % 10) + text[place + 1 :]
+            return type(value)(changed) if isinstance(value, float | int) else changed
+    return None
+
+
+@pytest.mark.parametrize(
+    "section", ["gains", "assumptions", "certificate", "study", "controller", "golden", "reference"]
+)
+def test_one_changed_digit_is_refused(section, document):
+    """Every number of the file, a few hundred in the long lists thinned out."""
+    places = [
+        (p, v) for p, v in walk(document[section], (section,)) if not isinstance(v, bool) and one_digit(v) is not None
+    ]
+    assert places
+    for path, value in places[:: max(1, len(places) // 40)]:
+        changed = one_digit(value)
+        if changed == value:
+            continue
+        put(document, path, changed)
+        assert status(json.dumps(document)) == 2, path
+        put(document, path, value)
+
+
+def gain(name, factor):
+    def change(data):
+        entry = next(g for g in data["gains"] if g["name"] == name)
+        entry["value"] *= factor
+
+    return change
+
+
+def assumption(name, lower=1.0, upper=1.0):
+    def change(data):
+        entry = next(a for a in data["assumptions"] if a["name"] == name)
+        entry["lower"], entry["upper"] = entry["lower"] * lower, entry["upper"] * upper
+
+    return change
+
+
+def rational(key, factor, index=None):
+    def change(data):
+        holder = data["certificate"]
+        if index is None:
+            holder[key] = str(Fraction(holder[key]) * factor)
+        else:
+            holder[key][index] = str(Fraction(holder[key][index]) * factor)
+
+    return change
+
+
+def operation(where, old, new):
+    def change(data):
+        program = (
+            data["certificate"]["model"]["plant"] if where == "plant" else data["certificate"]["model"]["law"][where]
+        )
+        entry = next(o for o in program["operations"] if o[0] == old)
+        entry[0] = new
+
+    return change
+
+
+def set_at(*path, value):
+    return lambda data: put(data, path, value)
+
+
+def drop_obligation(name):
+    def change(data):
+        data["obligations"] = [o for o in data["obligations"] if o["name"] != name]
+
+    return change
+
+
+def both(name, factor):
+    """Widen a parameter in the study and in the assumptions: a consistent forgery of a stronger claim."""
+
+    def change(data):
+        parameter = data["study"]["plant"]["parameters"][name]
+        parameter["tolerance"] = min(0.99, parameter["tolerance"] * factor)
+        entry = next(a for a in data["assumptions"] if a["name"] == f"parameter.{name}")
+        spread = abs(parameter["value"]) * parameter["tolerance"] * (1 + 1e-12)
+        entry["lower"], entry["upper"] = parameter["value"] - spread, parameter["value"] + spread
+
+    return change
+
+
+def load(low, high):
+    def change(data):
+        data["study"]["uncertainty"]["disturbances"]["load_force"] = [low, high]
+        entry = next(a for a in data["assumptions"] if a["name"] == "disturbance.load_force")
+        entry["lower"], entry["upper"] = low, high
+
+    return change
+
+
+def rate(factor):
+    def change(data):
+        data["controller"]["rate_hz"] *= factor
+        data["study"]["controller"]["rate_hz"] *= factor
+
+    return change
+
+
+def ball(factor):
+    def change(data):
+        balls = data["certificate"]["envelope"]["ball"]
+        balls[0] = str(Fraction(balls[0]) * factor)
+
+    return change
+
+
+MUTATIONS = {
+    "smaller outer gain": gain("beta_1", 0.9),
+    "larger outer gain": gain("beta_1", 1.1),
+    "smaller inner gain": gain("beta_2", 0.9),
+    "larger inner gain": gain("beta_2", 1.1),
+    "gain of zero": gain("beta_2", 0.0),
+    "negative gain": gain("beta_2", -1.0),
+    "stronger adaptation": gain("epsilon_2", 50.0),
+    "less leakage": gain("sigma_2", 1e-4),
+    "adaptation too fast for the rate": gain("delta_2", 1e5),
+    "wider inertia": both("motor_inertia", 1.5),
+    "wider torque scale": both("torque_scale", 2.0),
+    "slower drive": both("drive_lag", 3.0),
+    "more friction": both("coulomb_friction", 1.9),
+    "more screw friction": both("screw_friction", 1.4),
+    "assumption narrower than the study": assumption("parameter.motor_inertia", 1.05, 0.95),
+    "load narrower than the study": assumption("disturbance.load_force", 1.02, 0.98),
+    "heavier load": load(65e3, 80e3),
+    "load from the other side": load(-76e3, 76e3),
+    "slower rate": rate(0.8),
+    "rates that differ": set_at("controller", "rate_hz", value=2000.0),
+    "faster decay": rational("decay", Fraction(11, 10)),
+    "no decay": rational("decay", Fraction(0)),
+    "smaller box": rational("radii", Fraction(9, 10), 0),
+    "smaller inner box": rational("radii", Fraction(95, 100), 1),
+    "negative box": rational("radii", Fraction(-1), 1),
+    "smaller held error": rational("held", Fraction(9, 10), 0),
+    "negative held error": rational("held", Fraction(-1), 0),
+    "other weight": rational("weights", Fraction(3, 2), 1),
+    "negative weight": rational("weights", Fraction(-1), 1),
+    "larger nu": rational("young", Fraction(12, 10), 1),
+    "negative nu": rational("young", Fraction(-1), 0),
+    "leak from nowhere": set_at("certificate", "leak", 1, value="1000"),
+    "smaller ball": ball(Fraction(95, 100)),
+    "sign in the plant": operation("plant", "sub", "add"),
+    "product made a sum": operation("plant", "mul", "add"),
+    "unknown operator": operation("plant", "mul", "exec"),
+    "law that knows the load": set_at("certificate", "model", "law", 1, value={
+        "inputs": ["load_force"], "operations": [["input", "load_force"]], "outputs": [0]}),
+    "inertia that depends on the speed": set_at("certificate", "model", "plant", "outputs", 1, value=0),
+    "target that comes later": set_at("certificate", "model", "rows", 1, "target", value=2),
+    "target of itself": set_at("certificate", "model", "rows", 1, "target", value=1),
+    "lag turned into a governed row": set_at("certificate", "model", "rows", 2, "governed", value=True),
+    "input of no row": set_at("certificate", "model", "drives", value=[7]),
+    "no noise": set_at("assumptions", -5, "upper", value=0.0),
+    "limit of zero": set_at("study", "plant", "limits", 0, "value", value=0.0),
+    "lower torque limit": set_at("study", "plant", "limits", 0, "value", value=60.0),
+    "lower speed limit": set_at("study", "plant", "limits", 1, "value", value=0.05),
+    "limit of nothing": set_at("study", "plant", "limits", 0, "signals", value=[]),
+    "no limits": set_at("study", "plant", "limits", value=[]),
+    "shorter stroke": set_at("study", "plant", "stroke_m", value=[0.0, 0.39]),
+    "tighter requirement": set_at("study", "requirements", "tracking_error_m", value=0.001),
+    "requirement of zero": set_at("study", "requirements", "tracking_error_m", value=0.0),
+    "larger initial error": set_at("study", "uncertainty", "initial", "position", value=0.05),
+    "reference that jumps": set_at("reference", "segments", 1, "coefficients", 0, value=0.2),
+    "reference that moves at its end": set_at("reference", "segments", -1, "coefficients", -2, value=0.1001),
+    "faster reference": set_at("reference", "segments", 1, "coefficients", 14, value=0.45),
+    "stated bounds on the reference": set_at("reference", "derivative_bounds", 2, "upper", value=0.001),
+    "golden output": set_at("golden", "vectors", 3, "u", 0, value=12.5),
+    "golden state": set_at("golden", "vectors", 3, "theta_next", 1, value=1.0),
+    "few golden vectors": set_at("golden", "vectors", value=[]),
+    "simulation outside the envelope": set_at("validation", "largest_error_m", value=0.01),
+    "another law": set_at("controller", "law", value="pid"),
+    "another kind of certificate": set_at("certificate", "kind", value="trust-me"),
+    "another schema": set_at("schema", value="hdmm-opt/gains/2"),
+    "a nominal value": set_at("controller", "nominal", "transmission", value=1.0),
+    **{f"without {name}": drop_obligation(name) for name in checker.REQUIRED["rac"]},
+}  # fmt: skip
+#: Mutations that leave a true statement: the model-free law reads no nominal values, and its bounds are symmetric.
+HARMLESS = {"a nominal value", "load from the other side"}
+
+
+@pytest.mark.parametrize("name", MUTATIONS)
+def test_a_resealed_mutation_is_refused(name, document, resealed):
+    MUTATIONS[name](document)
+    report = checker.check_text(resealed(document))
+    if name in HARMLESS:
+        assert report.status == 0
+    else:
+        assert report.status in (1, 2), f"{name}: {report.message}"
+        assert "\n" not in report.message
+
+
+def test_resealing_without_a_change_keeps_the_verdict(document, resealed):
+    assert status(resealed(document)) == 0
+
+
+def test_provenance_is_outside_the_hash(document):
+    document["provenance"]["wall_time_s"] = 1.0
+    assert status(json.dumps(document)) == 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "{", "[]", "null", '"x"', '{"schema": NaN}', "[" * 100_000, '{"a":' * 50_000, '{"schema": 1e999999999}',
+        '{"schema": ' + "9" * 5000 + "}", '{"a": 1, "a": 2}', "\x00", '{"schema": "hdmm-opt/gains/1"}',
+    ],
+)  # fmt: skip
+def test_what_is_no_gain_file_is_unreadable(text):
+    report = checker.check_text(text)
+    assert report.status == 2 and report.message.startswith("unreadable") and "\n" not in report.message
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 0.999])
+def test_truncated_files_are_unreadable(share, gain_text):
+    assert status(gain_text[: int(share * len(gain_text))]) == 2
+
+
+def test_a_chain_of_squares_does_not_explode(document, resealed):
+    plant = document["certificate"]["model"]["plant"]
+    last = len(plant["operations"])
+    plant["operations"].append(["input", "speed"])
+    for k in range(400):
+        plant["operations"].append(["mul", last + k, last + k])
+    plant["outputs"][4] = last + 400
+    assert status(resealed(document)) == 1
+
+
+@settings(max_examples=60, deadline=None)
+@given(arrays(np.int64, (4, 4), elements=st.integers(-9, 9)), st.integers(-3, 30))
+def test_exact_definiteness_agrees_with_eigenvalues(entries, shift):
+    matrix = entries + entries.T + shift * np.eye(4, dtype=np.int64)
+    smallest = np.linalg.eigvalsh(matrix.astype(float)).min()
+    found = checker.positive_definite([[Fraction(int(v)) for v in row] for row in matrix])
+    if abs(smallest) > 1e-6:
+        assert found == (smallest > 0)
+
+
+def test_definiteness_is_strict():
+    singular = [[Fraction(1), Fraction(1)], [Fraction(1), Fraction(1)]]
+    assert not checker.positive_definite(singular)
+    singular[1][1] += Fraction(1, 10**60)
+    assert checker.positive_definite(singular)

@@ -1,0 +1,99 @@
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hdmm_opt.control import RAC
+from hdmm_opt.plants import pmsm_emla
+from stability import Interval, enclose, from_casadi
+from stability.form import Form, Symbols, evaluate, tangent
+
+
+def function(build, count):
+    z = ca.SX.sym("z", count)
+    return ca.Function("f", [z], [ca.vertcat(*build(*(z[i] for i in range(count))))])
+
+
+@pytest.mark.parametrize("level", ["torque", "voltage"])
+def test_the_plant_as_data_equals_casadi(level):
+    plant = pmsm_emla(level)
+    model = RAC(plant=plant).loop_model()
+    vector = ca.vertcat(plant.x, plant.u, plant.w, plant.p)
+    names = (*plant.states, *plant.inputs, *plant.disturbances, *plant.parameters)
+    reference = ca.Function("f", [vector], [ca.vertcat(plant.mass, plant.force)])
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        point = [
+            *random.uniform(-1, 1, len(plant.states) + len(plant.inputs)),
+            random.uniform(-8e4, 8e4),
+            *plant.values().values(),
+        ]
+        expected = np.array(reference(point)).ravel()
+        assert model.plant(dict(zip(names, point, strict=True))) == pytest.approx(expected, rel=1e-13)
+
+
+def test_an_operation_that_cannot_be_bounded_is_named():
+    with pytest.raises(NotImplementedError, match="the prover bounds"):
+        from_casadi(function(lambda x: [ca.sin(x)], 1), ("x",))
+
+
+def test_unused_operations_and_inputs_are_left_out():
+    expression = from_casadi(function(lambda x, y: [x + 1], 2), ("x", "y"))
+    assert expression.inputs == ("x",)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(-3, 3), min_size=6, max_size=6), st.lists(st.floats(0, 1), min_size=3, max_size=3))
+def test_enclosures_and_forms_hold_every_value(ends, shares):
+    expression = from_casadi(
+        function(lambda x, y, p: [p * x * y + ca.tanh(x - y) / (2 + y**2) - p * x, ca.sqrt(4 + x * x)], 3),
+        ("x", "y", "p"),
+    )
+    boxes = {n: Interval(*sorted(ends[2 * k : 2 * k + 2])) for k, n in enumerate(("x", "y", "p"))}
+    point = {n: b.low + s * (b.high - b.low) for (n, b), s in zip(boxes.items(), shares, strict=True)}
+    natural = enclose(expression, boxes)
+    symbols = Symbols(ranges={"a": boxes["x"], "b": boxes["y"]})
+    inputs = {
+        "x": symbols.value("x", Form.of("a")),
+        "y": symbols.value("y", Form.of("b")),
+        "p": symbols.constant(boxes["p"], "p"),
+    }
+    for exact, outer, value in zip(expression(point), natural, evaluate(expression, inputs, symbols), strict=True):
+        assert outer.low - 1e-9 <= exact <= outer.high + 1e-9
+        assert value.range.low - 1e-9 <= exact <= value.range.high + 1e-9
+        form = symbols.expand(value.form)
+        held = form.constant + form.coefficient("a") * Interval(point["x"])
+        held = held + form.coefficient("b") * Interval(point["y"])
+        assert held.low - 1e-9 <= exact <= held.high + 1e-9
+
+
+def test_what_the_law_cancels_cancels_in_the_form():
+    """(R - R̂) i and (L - L̂) w i_d: products that plant and law share are one symbol."""
+    expression = from_casadi(
+        function(lambda i, w, r, r_hat, l, l_hat: [(r_hat * i + l_hat * (w * i)) - r * i - l * (w * i)], 6),
+        ("i", "w", "r", "r_hat", "l", "l_hat"),
+    )
+    symbols = Symbols(ranges={"i": Interval(-50, 50), "w": Interval(-1000, 1000)})
+    inputs = {name: symbols.value(name, Form.of(name)) for name in ("i", "w")}
+    inputs |= {"r": symbols.constant(Interval(0.9, 1.1), "r"), "r_hat": symbols.constant(Interval(1.0), "")}
+    inputs |= {"l": symbols.constant(Interval(0.002, 0.002), "l"), "l_hat": symbols.constant(Interval(0.002), "")}
+    value = evaluate(expression, inputs, symbols)[0]
+    assert value.range.magnitude == pytest.approx(0.1 * 50, rel=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(-2, 2), st.floats(-2, 2), st.floats(-1, 1), st.floats(-1, 1))
+def test_tangent_holds_the_derivative(x, y, dx, dy):
+    build = lambda a, b: [ca.tanh(a * b) / (3 + a**2) + ca.sqrt(5 + b) - a]  # noqa: E731
+    expression = from_casadi(function(build, 2), ("x", "y"))
+    z = ca.SX.sym("z", 2)
+    jacobian = ca.Function("J", [z], [ca.jacobian(build(z[0], z[1])[0], z)])
+    exact = float(np.array(jacobian([x, y])).ravel() @ [dx, dy])
+    held = tangent(
+        expression,
+        {"x": Interval(x), "y": Interval(y)},
+        {n: Form(constant=Interval(v)) for n, v in (("x", dx), ("y", dy))},
+    ).constant
+    assert held.low - 1e-12 <= exact <= held.high + 1e-12
+    assert held.high - held.low < 1e-9
