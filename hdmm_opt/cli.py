@@ -20,13 +20,16 @@ class _Group(click.Group):
     """Turns bad input into one line and exit status 2, and Ctrl-C into 130."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        from .errors import InvalidInputError
+        from .errors import DefectError, InvalidInputError
 
         try:
             return super().invoke(ctx)
         except InvalidInputError as error:
             click.echo(f"hdmm-opt: {error}", err=True)
             sys.exit(MISUSE)
+        except DefectError as error:
+            click.echo(f"hdmm-opt: DEFECT of the prover: {error}", err=True)
+            sys.exit(NOT_PROVED)
         except (KeyboardInterrupt, click.Abort):
             click.echo("hdmm-opt: interrupted; nothing half-written, go on with --resume", err=True)
             sys.exit(INTERRUPTED)

@@ -18,6 +18,7 @@ from .errors import InvalidInputError
 from .gain_file import gains_of, reference_of, write_text
 from .problem import Problem, assemble, study_of
 from .progress import bar
+from .selection import Options
 from .simulation import ClosedLoop, Metrics, Scenario, Trace, scenarios
 
 
@@ -32,7 +33,7 @@ def run_design(
     state = target.with_name(f".{target.name}.state")
     if report is not None:
         _prepare_folder(report)
-    options = pipeline.Options(seed=seed, jobs=jobs, full=full, state=state, resume=resume)
+    options = Options(seed=seed, jobs=jobs, full=full, state=state, resume=resume)
     with bar() as progress:
         result = pipeline.design(chosen, options, progress)
     state.unlink(missing_ok=True)

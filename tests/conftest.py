@@ -3,8 +3,13 @@ import json
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from hdmm_opt import gain_file
+
+# Timing is no property of the code, and a seed that changes is no test.
+settings.register_profile("project", deadline=None, derandomize=True)
+settings.load_profile("project")
 
 GAINS = Path(__file__).parent.parent / "notebooks" / "gains"
 

@@ -100,7 +100,7 @@ def hand_written(x, r, theta, gains, period, limit):
 positive = st.floats(0.01, 100)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(st.floats(-0.1, 0.1), min_size=3, max_size=3),
     st.lists(st.floats(-0.1, 0.1), min_size=4, max_size=4),

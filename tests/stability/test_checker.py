@@ -290,7 +290,7 @@ def test_a_chain_of_squares_does_not_explode(document, resealed):
     assert status(resealed(document)) == 1
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(arrays(np.int64, (4, 4), elements=st.integers(-9, 9)), st.integers(-3, 30))
 def test_exact_definiteness_agrees_with_eigenvalues(entries, shift):
     matrix = entries + entries.T + shift * np.eye(4, dtype=np.int64)

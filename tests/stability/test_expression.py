@@ -43,7 +43,7 @@ def test_unused_operations_and_inputs_are_left_out():
     assert expression.inputs == ("x",)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.floats(-3, 3), min_size=6, max_size=6), st.lists(st.floats(0, 1), min_size=3, max_size=3))
 def test_enclosures_and_forms_hold_every_value(ends, shares):
     expression = from_casadi(
@@ -71,18 +71,18 @@ def test_enclosures_and_forms_hold_every_value(ends, shares):
 def test_what_the_law_cancels_cancels_in_the_form():
     """(R - R̂) i and (L - L̂) w i_d: products that plant and law share are one symbol."""
     expression = from_casadi(
-        function(lambda i, w, r, r_hat, l, l_hat: [(r_hat * i + l_hat * (w * i)) - r * i - l * (w * i)], 6),
-        ("i", "w", "r", "r_hat", "l", "l_hat"),
+        function(lambda i, w, r, r_hat, h, h_hat: [(r_hat * i + h_hat * (w * i)) - r * i - h * (w * i)], 6),
+        ("i", "w", "r", "r_hat", "h", "h_hat"),
     )
     symbols = Symbols(ranges={"i": Interval(-50, 50), "w": Interval(-1000, 1000)})
     inputs = {name: symbols.value(name, Form.of(name)) for name in ("i", "w")}
     inputs |= {"r": symbols.constant(Interval(0.9, 1.1), "r"), "r_hat": symbols.constant(Interval(1.0), "")}
-    inputs |= {"l": symbols.constant(Interval(0.002, 0.002), "l"), "l_hat": symbols.constant(Interval(0.002), "")}
+    inputs |= {"h": symbols.constant(Interval(0.002, 0.002), "h"), "h_hat": symbols.constant(Interval(0.002), "")}
     value = evaluate(expression, inputs, symbols)[0]
     assert value.range.magnitude == pytest.approx(0.1 * 50, rel=1e-9)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(-2, 2), st.floats(-2, 2), st.floats(-1, 1), st.floats(-1, 1))
 def test_tangent_holds_the_derivative(x, y, dx, dy):
     build = lambda a, b: [ca.tanh(a * b) / (3 + a**2) + ca.sqrt(5 + b) - a]  # noqa: E731

@@ -67,7 +67,7 @@ def test_shortest_duration_touches_one_limit():
         assert max(shares) == pytest.approx(1.0, rel=1e-6)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(st.floats(-1, 1), min_size=17, max_size=17))
 def test_control_points_bound_every_derivative(points):
     spline = Spline(knots=clamped_knots(0.0, 3.0, 12), coefficients=np.array(points))
@@ -120,7 +120,7 @@ def test_effort_limit_holds_between_the_collocation_points():
 
 
 def test_what_cannot_be_reached_says_what_would_do():
-    with pytest.raises(LimitViolatedError, match="would do|allow more time"):
+    with pytest.raises(LimitViolatedError, match="would do"):
         solve(task(longest=2.0))
     with pytest.raises(LimitViolatedError):
         solve(task(goal=0.7))
