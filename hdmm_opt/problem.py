@@ -127,6 +127,7 @@ def assemble(study: Study, reference: Reference | None = None) -> Problem:
         noise=noise,
         initial=initial,
         period=1 / study.controller.rate_hz,
+        transient=study.validation.transient_s,
     )
     loop = ClosedLoop(law=law, period=bounds.period, noise=noise, initial=initial, nominal_load=nominal["load_force"])
     return Problem(

@@ -42,7 +42,7 @@ class Composition:
         leak: p = ε θ*. Shape (n,).
         radii: Assumed box |Q_i| <= radii_i. Shape (n,).
         held: Assumed bounds on the input error. Shape (m,).
-        ball: Certified ultimate bounds on |Q_i|. Shape (n,).
+        ball: Certified bounds on |Q_i| from the end of the transient on. Shape (n,).
         rows: The enclosures over the assumed box.
     """
 
@@ -179,17 +179,18 @@ class _Search:
         return math.inf if found is None else float(self._radii(rows, found, decay)[1][0])
 
     def _solve(self, rows: ErrorRows, scales: Array, decay: float) -> _Weights | None:
-        adaptive = self.adaptive & (self.delta * self.sigma >= decay)
+        adaptive = self.adaptive & (self.delta * self.sigma >= decay) & (rows.control_gain > 0)
         return _program(len(scales), bool(adaptive.any())).solve(
             rows, scales, decay, _AdaptationCost.of(rows, adaptive, self.epsilon, self.delta, self.sigma)
         )
 
     def _radii(self, rows: ErrorRows, found: _Weights, decay: float) -> tuple[Array, Array]:
-        """Radii of the invariant set and of the ultimate ball."""
+        """Radii of the invariant set, and of the ball that holds the errors after the transient."""
         level = ultimate_level(rows, found, decay, self.epsilon, self.delta, self.sigma)
         start = initial_level(rows, found, self.initial, self.epsilon, self.delta)
+        settled = level + max(0.0, start - level) * math.exp(-decay * self.bounds.transient)
         scale = found.weights * rows.mass_low
-        return np.sqrt(2 * max(level, start) / scale), np.sqrt(2 * level / scale)
+        return np.sqrt(2 * max(level, start) / scale), np.sqrt(2 * settled / scale)
 
 
 def rowwise_radii(rows: ErrorRows, radii: Array) -> Array:

@@ -90,6 +90,7 @@ class Bounds:
         noise: Bound on the measurement error of each row's state. Shape (n,).
         initial: Bound on each |Q_i(0)|. Shape (n,).
         period: Control period in s; 0 for a continuous law.
+        transient: Time from which on the bound on the tracking error must hold, s.
     """
 
     parameters: Mapping[str, Interval]
@@ -99,3 +100,4 @@ class Bounds:
     noise: tuple[float, ...]
     initial: tuple[float, ...]
     period: float
+    transient: float = 0.0

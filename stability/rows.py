@@ -64,6 +64,7 @@ def error_rows(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], radii
 
     Raises:
         ZeroDivisionError: a divisor of the model can vanish in the box.
+        ValueError: a modelling term reads the jerk r3, whose rate has no bound.
 
     Not guaranteed: that the box is invariant, or that `held` is large enough. The caller checks both.
     """
@@ -77,6 +78,8 @@ class _Builder:
         self.model, self.bounds, self.radii = model, bounds, [float(r) for r in radii]
         self.gains = dict(zip(model.governed, gains, strict=True))
         self.terms = dict(zip(model.governed, model.law, strict=True))
+        if any("r3" in term.inputs for term in model.law):
+            raise ValueError("a modelling term must not read the jerk r3: its rate has no bound; use r0, r1, r2")
         self.symbols = Symbols()
         for k, interval in enumerate(bounds.reference):
             self.symbols.ranges[f"r{k}"] = interval

@@ -104,6 +104,7 @@ def claim_of(
         limits=[{"name": "input", "signals": list(model.inputs), "value": Fraction(limit), "unit": "1"}],
         stroke=(Fraction(-(10**12)), Fraction(10**12)),
         accuracy=Fraction(accuracy),
+        transient=Fraction(bounds.transient),
     )
 
 

@@ -4,16 +4,19 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from known_answers import claim_of, verdict
 
-from stability import checker
+from stability import Bounds, Composition, Gains, Interval, LoopModel, Row, certify, checker, from_casadi
 
 
 def status(text):
@@ -171,7 +174,60 @@ def ball(factor):
     return change
 
 
+def move_in_time(data):
+    """A dwell moved back in time: the reference jumps, though its joints agree in position."""
+    segment = data["reference"]["segments"][2]
+    segment["knots"] = [knot - 5.0 for knot in segment["knots"]]
+
+
+def known_load(data):
+    """A disturbance under the name of a design constant, which the law may read."""
+    data["controller"]["nominal"]["load_force"] = 70e3
+    data["study"]["uncertainty"]["disturbances"]["nominal.load_force"] = [65e3, 76e3]
+    data["assumptions"].append(
+        {"name": "disturbance.nominal.load_force", "lower": 65e3, "upper": 76e3, "unit": "N", "source": "study"}
+    )
+
+
+def without_load(data):
+    """A plant that does not feel its load."""
+    program = data["certificate"]["model"]["plant"]
+    entry = next(o for o in program["operations"] if o[1] == "load_force")
+    entry[:] = ["const", "0.0"]
+
+
+def upside_down(data):
+    data["study"]["plant"]["parameters"]["load_mass"]["tolerance"] = -0.9
+
+
+def in_study(*path, value):
+    return set_at("study", *path, value=value)
+
+
 MUTATIONS = {
+    "segment moved in time": move_in_time,
+    "late start": lambda data: [s.update(knots=[k + 1.0 for k in s["knots"]]) for s in data["reference"]["segments"]],
+    "law that reads the jerk": set_at("certificate", "model", "law", 1, value={
+        "inputs": ["r3"], "operations": [["input", "r3"]], "outputs": [0]}),
+    "disturbance named as a constant": known_load,
+    "plant without its load": without_load,
+    "negative tolerance": upside_down,
+    "load upside down": in_study("uncertainty", "disturbances", "load_force", value=[76e3, 65e3]),
+    "one-sided noise": set_at("assumptions", -6, "lower", value=-0.05),
+    "one-sided start": set_at("assumptions", -3, "lower", value=-5.0),
+    "another period": set_at("controller", "period_s", value=0.1),
+    "no subsystems": set_at("controller", "subsystems", value=[]),
+    "modelling terms that are not there": set_at("controller", "modelling", value=["mechanics"]),
+    "a fixed gain in the study": in_study("controller", "gains", "beta_1", value={"value": 50.0}),
+    "faster envelope": lambda data: data["certificate"]["envelope"].update(rate="1000"),
+    "smaller initial set": lambda data: data["certificate"]["envelope"]["initial"].__setitem__(0, "0"),
+    "a recorded refutation": set_at("obligations", 3, "verdict", value="refuted"),
+    "negative simulated error": set_at("validation", "largest_error_m", value=-1.0),
+    "wider stated bounds": set_at("reference", "derivative_bounds", 3, "upper", value=1e9),
+    "limit on nothing": in_study("plant", "limits", 1, "signals", value=[]),
+    "limit with a line break": in_study("plant", "limits", 0, "name", value="x\nother.json: proved"),
+    "unit with a line break": in_study("plant", "limits", 0, "unit", value="x\nother.json: proved"),
+    "infinite golden vector": lambda data: data["golden"]["vectors"][0].update(x=[1e200, 0.0, 0.0], theta_next=[0.0, 0.0]),
     "smaller outer gain": gain("beta_1", 0.9),
     "larger outer gain": gain("beta_1", 1.1),
     "smaller inner gain": gain("beta_2", 0.9),
@@ -286,7 +342,8 @@ def test_a_chain_of_squares_does_not_explode(document, resealed):
     plant["operations"].append(["input", "speed"])
     for k in range(400):
         plant["operations"].append(["mul", last + k, last + k])
-    plant["outputs"][4] = last + 400
+    plant["operations"].append(["add", plant["outputs"][4], last + 400])
+    plant["outputs"][4] = last + 401
     assert status(resealed(document)) == 1
 
 
@@ -298,6 +355,54 @@ def test_exact_definiteness_agrees_with_eigenvalues(entries, shift):
     found = checker.positive_definite([[Fraction(int(v)) for v in row] for row in matrix])
     if abs(smallest) > 1e-6:
         assert found == (smallest > 0)
+
+
+def test_theta_in_v_is_refused_where_the_gain_may_change_sign():
+    """x' = -1000 x + c u + w with c in [-0.1, 0.3]: a negative weight on θ̂ would buy any bound."""
+    z = ca.SX.sym("z", 4)
+    names = ("x", "u", "c", "w")
+    plant = from_casadi(ca.Function("p", [z], [ca.vertcat(1, -1000 * z[0] + z[2] * z[1] + z[3])]), names)
+    y = ca.SX.sym("y", 1)
+    law = (from_casadi(ca.Function("l", [y], [ca.SX(0)]), ("x",)),)
+    row = Row(state="x", unit="m", target="reference", governed=True)
+    model = LoopModel(rows=(row,), drives=(0,), inputs=("u",), plant=plant, law=law)
+    gains = (Gains(beta=1.0, epsilon=1e-3, delta=1.0, sigma=5000.0),)
+
+    def verdict_with(lower):
+        bounds = Bounds(
+            parameters={"c": Interval(lower, 0.3)}, disturbances={"w": Interval(-10.0, 10.0)}, nominal={},
+            reference=(Interval(0.0),) * 4, noise=(0.0,), initial=(1e-5,), period=1e-5,
+        )  # fmt: skip
+        found = certify(model, bounds, gains, np.array([1.0]))
+        assert isinstance(found, Composition)
+        forged = replace(claim_of(model, bounds, gains, found), leak=[Fraction(1, 10**9)])
+        return verdict(claim_of(model, bounds, gains, found)), verdict(forged)
+
+    assert verdict_with(0.1) == (True, True)
+    assert verdict_with(-0.1) == (True, False)
+
+
+def test_tiny_arguments_do_not_keep_the_checker_busy():
+    tiny = Fraction(1, 2**2900)
+    low, high = checker.tanh((tiny, tiny))
+    assert 0 < low <= tiny <= high
+    for x in (Fraction(1, 2**39), Fraction(-1, 2**41), Fraction(1, 3)):
+        low, high = checker.tanh_point(x)
+        assert low <= high and high - low < Fraction(1, 2**80)
+        assert float(low) == pytest.approx(np.tanh(float(x)), rel=1e-14)
+
+
+def test_a_model_that_is_too_large_is_not_proved(document, resealed):
+    plant = document["certificate"]["model"]["plant"]
+    speed = len(plant["operations"])
+    plant["operations"].append(["input", "speed"])
+    total = speed
+    for _ in range(900):
+        plant["operations"] += [["add", total, speed], ["mul", len(plant["operations"]), speed]]
+        total = len(plant["operations"]) - 1
+    plant["operations"].append(["add", plant["outputs"][4], total])
+    plant["outputs"][4] = total + 1
+    assert status(resealed(document)) == 1
 
 
 def test_definiteness_is_strict():
