@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hdmm_opt.control import MODELLING, RAC
-from hdmm_opt.plants import SOURCES, defaults, effort, pmsm_emla
+from hdmm_opt.plants import SOURCES, Limit, Plant, defaults, effort, pmsm_emla
 from hdmm_opt.plants import pmsm_emla as build
 from hdmm_opt.plants.parameter import Parameter
 from hdmm_opt.plants.pmsm_emla import MAXIMUM_SPEED, PEAK_CURRENT, PHASE_VOLTAGE, RATED_CURRENT, TORQUE_CONSTANT
@@ -153,3 +153,36 @@ def test_effort_is_the_inverse_of_the_plant():
     plant = build("torque")
     torque = np.array(effort(plant, 60e3)(0.2, 0.05, 0.2, 0.0)[0]).ravel()[0]
     assert rate(plant, [0.2, 0.05, torque], [0], [60e3])[1] == pytest.approx(0.2, rel=1e-12)
+
+
+def chain_plant(order):
+    """x_i' = x_{i+1}, x_n' = u, for any number of subsystems."""
+    x, u, w, p = (ca.SX.sym(n, k) for n, k in (("x", order), ("u", 1), ("w", 1), ("p", 1)))
+    force = ca.vertcat(*(x[i + 1] for i in range(order - 1)), u[0] + w[0] * p[0])
+    return Plant(
+        name="chain", level="torque", states=tuple(f"x{i}" for i in range(order)), state_units=("m",) * order,
+        inputs=("u",), input_unit="m", disturbances=("load_force",),
+        parameters={"gain": Parameter(value=1.0, unit="1", meaning="of the disturbance")},
+        targets=("reference", *range(order - 1)), governed=(True,) * order, drives=(order - 1,),
+        x=x, u=u, w=w, p=p, mass=ca.SX.ones(order), force=force,
+        limits=(Limit(name="u", signals=("u",), value=1e9, unit="m", source="assumed"),), stroke=(-1.0, 1.0), outputs={},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("order", [1, 2, 5, 9])
+def test_one_law_for_any_number_of_subsystems(order):
+    law = RAC(plant=chain_plant(order))
+    random = np.random.default_rng(order)
+    x, r, theta = random.normal(size=order), random.normal(size=4), random.uniform(size=order)
+    gains = random.uniform(0.5, 2.0, (order, 4))
+    u, after, errors = (np.array(v).ravel() for v in law.step_function(1e-3)(x, r, theta, gains, [1.0], [0.0]))
+    goal = r[0]
+    for i in range(order):
+        q = x[i] - goal
+        assert errors[i] == pytest.approx(q)
+        assert after[i] == pytest.approx(
+            theta[i] + 1e-3 * (0.5 * gains[i, 1] * gains[i, 2] * q * q - gains[i, 2] * gains[i, 3] * theta[i])
+        )
+        goal = -0.5 * (gains[i, 0] + gains[i, 1] * theta[i]) * q + (r[1] if i == 0 and order > 1 else 0.0)
+    assert u[0] == pytest.approx(goal + (r[1] if order == 1 else 0.0))
+    assert len(law.loop_model().rows) == order
