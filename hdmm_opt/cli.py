@@ -87,11 +87,12 @@ def design(
 @main.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
 @click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
-def check(files: tuple[Path, ...], as_json: bool) -> None:
+@click.option("--junit", type=click.Path(path_type=Path), help="Write the verdicts as JUnit XML.")
+def check(files: tuple[Path, ...], as_json: bool, junit: Path | None) -> None:
     """Re-prove gain files from the files alone, in exact arithmetic. Nothing that a file says of itself is believed."""
-    from stability import checker
+    from .verdicts import run_check
 
-    sys.exit(checker.main([*map(str, files), *(["--json"] if as_json else [])]))
+    sys.exit(run_check(files, as_json, junit))
 
 
 @main.command()

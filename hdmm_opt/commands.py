@@ -15,7 +15,8 @@ import click
 from . import gain_file, pipeline, study, validation
 from .cli import NOT_PROVED, PROVED
 from .errors import InvalidInputError
-from .gain_file import gains_of, reference_of, write_text
+from .files import check_writable, write_text
+from .gain_file import gains_of, reference_of
 from .problem import Problem, assemble, study_of
 from .progress import bar
 from .selection import Options
@@ -28,7 +29,7 @@ def run_design(
     """`hdmm-opt design`."""
     chosen = study.load(name)
     target = Path(f"{chosen.study.name}.gains.json") if output is None else output
-    gain_file.check_writable(target)
+    check_writable(target)
     rejected = target.with_name(target.name.removesuffix(".json").removesuffix(".gains") + ".rejected.json")
     state = target.with_name(f".{target.name}.state")
     if report is not None:
@@ -57,7 +58,7 @@ def _prepare_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InvalidInputError(f"{folder}: cannot make that folder: {error.strerror}; choose another") from None
-    gain_file.check_writable(folder / "report.html")
+    check_writable(folder / "report.html")
 
 
 def _explain(name: str, result: pipeline.Design, left: Path) -> None:
@@ -102,7 +103,7 @@ def run_simulate(path: Path, name: str | None, csv_path: Path | None, as_json: b
     if csv_path is not None:
         if len(chosen) > 1:
             raise InvalidInputError(f"--csv writes one scenario; choose one with --scenario: {', '.join(offered)}")
-        gain_file.check_writable(csv_path)
+        check_writable(csv_path)
     results: dict[str, Metrics] = {}
     for key in chosen:
         loop, scenario = offered[key]
@@ -164,7 +165,7 @@ def run_trajectory(name: str, output: Path | None) -> int:
 
     chosen = study.load(name)
     if output is not None:
-        gain_file.check_writable(output)
+        check_writable(output)
     problem = assemble(chosen)
     moves = sum(1 for s in problem.reference.segments if s.coefficients.min() < s.coefficients.max())
     click.echo(f"{chosen.study.name}: {moves} moves ({chosen.reference.kind}), {problem.reference.duration:.4g} s")

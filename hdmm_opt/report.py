@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from .errors import InvalidInputError
-from .gain_file import gains_of, reference_of, write_text
+from .files import write_text
+from .gain_file import gains_of, reference_of
 from .problem import Problem, assemble, study_of
 from .simulation import Trace, scenarios
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from stability import Composition, Failure, Gains, checker, error_rows
 from tuning import Executor, Outcome, SearchState, Selection, select, start, step
 
-from . import gain_file, validation
+from . import validation
 from .errors import InvalidInputError
+from .files import write_text
 from .problem import Problem, assemble, resolved
 from .proof import certificate, slacks, violation
 from .simulation import scenarios
@@ -166,7 +167,7 @@ def _keep(options: Options, key: str, state: SearchState) -> None:
         "random": state.random,
         "evaluations": state.evaluations,
     }
-    gain_file.write_text(options.state, json.dumps(data))
+    write_text(options.state, json.dumps(data))
 
 
 def _restore(options: Options, key: str) -> SearchState | None:

@@ -1166,7 +1166,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", action="store_true", help="print the verdicts as JSON")
     options = parser.parse_args(arguments)
     reports = [check_file(path) for path in options.files]
-    if options.json:
+    show(reports, as_json=options.json)
+    return max(report.status for report in reports)
+
+
+def show(reports: list[Report], *, as_json: bool) -> None:
+    """Print the verdicts."""
+    if as_json:
         rows = [{**r.__dict__, "obligations": [o.__dict__ for o in r.obligations]} for r in reports]
         print(json.dumps(rows, indent=1))
     else:
@@ -1174,7 +1180,6 @@ def main(arguments: list[str] | None = None) -> int:
             print(f"{report.file}: {report.message}")
             for o in report.obligations:
                 print(f"  {o.verdict:9} {o.name:12} margin {o.margin:.4g} {o.unit}: {o.statement}")
-    return max(report.status for report in reports)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import pytest
 
 from hdmm_opt import gain_file, pipeline, selection, study
 from hdmm_opt.errors import DefectError
+from hdmm_opt.files import write_text
 from hdmm_opt.problem import assemble
 from hdmm_opt.proof import certificate, diagnose, longest_period, violation
 from hdmm_opt.selection import Options, Progress
@@ -77,14 +78,14 @@ def test_short_rationals_are_short_and_on_the_safe_side():
 
 def test_writing_is_whole_or_not_at_all(tmp_path, monkeypatch):
     target = tmp_path / "x.json"
-    gain_file.write_text(target, "old")
+    write_text(target, "old")
 
     def fail(*arguments):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("os.fsync", fail)
     with pytest.raises(Exception, match="No space left"):
-        gain_file.write_text(target, "new")
+        write_text(target, "new")
     assert target.read_text() == "old" and [p.name for p in tmp_path.iterdir()] == ["x.json"]
 
 

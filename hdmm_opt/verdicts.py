@@ -1,0 +1,54 @@
+"""`hdmm-opt check`: verdicts on the terminal, as JSON, and as JUnit XML for continuous integration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+from stability import checker
+from stability.checker import Report
+
+from .files import check_writable, write_text
+
+
+def run_check(files: Sequence[Path], as_json: bool, junit: Path | None) -> int:
+    """Check files, print the verdicts, write the XML; the largest exit status of a file."""
+    if junit is not None:
+        check_writable(junit)
+    reports = [checker.check_file(path) for path in files]
+    checker.show(reports, as_json=as_json)
+    if junit is not None:
+        write_text(junit, to_xml(reports))
+    return max(report.status for report in reports)
+
+
+def to_xml(reports: Sequence[Report]) -> str:
+    """One suite a file, one case an obligation, and one for the file as a whole.
+
+    Args:
+        reports: Verdicts of the checker.
+
+    Returns:
+        The XML text. A file that cannot be read is an error, what is not proved is a failure.
+    """
+    root = ElementTree.Element("testsuites", name="hdmm-opt check")
+    for report in reports:
+        cases = [("gain file", report.status == 0, report.message)]
+        for o in report.obligations:
+            cases.append((o.name, o.verdict == "proved", f"margin {o.margin:.4g} {o.unit}: {o.statement}"))
+        bad = sum(not good for _, good, _ in cases)
+        unreadable = report.status == 2
+        counts = {
+            "name": report.file,
+            "tests": str(len(cases)),
+            "failures": str(0 if unreadable else bad),
+            "errors": str(bad if unreadable else 0),
+        }
+        suite = ElementTree.SubElement(root, "testsuite", counts)
+        for name, good, text in cases:
+            case = ElementTree.SubElement(suite, "testcase", classname=report.file, name=name)
+            if not good:
+                ElementTree.SubElement(case, "error" if unreadable else "failure", message=text)
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
