@@ -108,6 +108,17 @@ def simulate(file: Path, scenario: str | None, csv_path: Path | None, as_json: b
 
 
 @main.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--budget", type=click.IntRange(1), default=300, show_default=True, help="Number of simulated runs.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the search.")
+def falsify(file: Path, budget: int, seed: int) -> None:
+    """Search the worst load, parameters and start inside the assumptions of FILE, and keep the worst in it."""
+    from .commands import run_falsify
+
+    sys.exit(run_falsify(file, budget, seed))
+
+
+@main.command()
 @click.argument("study")
 @click.option("-o", "output", type=click.Path(path_type=Path), help="Write the reference as JSON.")
 def trajectory(study: str, output: Path | None) -> None:

@@ -12,9 +12,11 @@ from typing import Any
 
 import click
 
+from stability import checker
+
 from . import gain_file, pipeline, study, validation
 from .cli import NOT_PROVED, PROVED
-from .errors import InvalidInputError
+from .errors import DefectError, InvalidInputError
 from .files import check_writable, write_text
 from .gain_file import gains_of, reference_of
 from .problem import Problem, assemble, study_of
@@ -157,6 +159,38 @@ def _csv(problem: Problem, trace: Trace) -> str:
     writer.writerow(columns)
     writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
     return text.getvalue()
+
+
+def run_falsify(path: Path, budget: int, seed: int) -> int:
+    """`hdmm-opt falsify`."""
+    from .falsification import falsify, stored
+
+    report = checker.check_file(path)
+    if report.status != PROVED:
+        raise InvalidInputError(f"{path}: {report.message}; only a proved file can be attacked")
+    document = gain_file.read(path)
+    problem, gains, offered = _from_file(path)
+    with bar() as progress:
+        progress.stage("falsify")
+        known = [scenario for _, scenario in offered.values()]
+        found = falsify(problem, gains, known, budget, seed, progress.update)
+    radius = float(Fraction(document["certificate"]["radii"][0]))
+    ball = float(Fraction(document["certificate"]["envelope"]["ball"][0]))
+    late = found.metrics.maximum_error_m
+    if not (found.largest_error <= radius and late <= ball):
+        text = json.dumps(asdict(found.scenario))
+        raise DefectError(f"a run reached {late:.6g} m, certified {ball:.6g} m; please report this scenario: {text}")
+    finished, verdict = gain_file.prove(stored(document, found, ball))
+    if verdict.status != PROVED:
+        raise DefectError(f"the file is no longer proved with its witness: {verdict.message}")
+    write_text(path, gain_file.to_text(finished))
+    click.echo(f"{found.runs} runs, none outside the certified envelope (that proves nothing more)", err=True)
+    worst = finished["validation"]["largest_error_after_transient_m"]
+    click.echo(
+        f"worst {1e3 * late:.4g} mm, worst on record {1e3 * worst:.4g} mm, certified {1e3 * ball:.4g} mm: "
+        f"ratio {ball / worst:.3g}"
+    )
+    return PROVED
 
 
 def run_trajectory(name: str, output: Path | None) -> int:
