@@ -65,7 +65,9 @@ def _prepare_folder(folder: Path) -> None:
 
 def _explain(name: str, result: pipeline.Design, left: Path) -> None:
     """Say what failed, by how much, and what would do."""
-    click.echo(f"{name}: not proved, no gain file written", err=True)
+    proved = result.report is not None and result.report.status == PROVED
+    what = "proved, but a requirement is missed" if proved else "not proved"
+    click.echo(f"{name}: {what}; no gain file written", err=True)
     for verdict in result.verdicts:
         click.echo(f"  {verdict.verdict}: {verdict.name} (margin {verdict.margin:.4g} {verdict.unit})", err=True)
         click.echo(f"    {verdict.statement}", err=True)

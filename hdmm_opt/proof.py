@@ -194,7 +194,7 @@ def _conditions(problem: Problem, continuous: Composition | Failure) -> list[Ver
                 unit="1/s",
                 verdict="undecided",
                 remedy="separate the bandwidths (a larger gain in that row or a smaller one before it), add a "
-                "modelling term for that row, or narrow the tolerances that enter it",
+                "modelling term for that row, or narrow the tolerances and the noise that enter it",
             )
         ]
     name, size, limit, unit = slacks(problem, continuous)[-1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
+from collections.abc import Iterator
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
@@ -18,6 +19,10 @@ from .plants import Parameter, defaults
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Pair = tuple[float, float]
+
+
+#: No quantity of these machines is larger in SI units.
+LARGEST = 1e12
 
 
 class _Section(BaseModel):
@@ -146,7 +151,7 @@ class ControllerSection(_Section):
 
     law: Literal["rac"]
     modelling: tuple[Literal["mechanics", "resistance", "back_emf", "decoupling"], ...] = ()
-    rate_hz: Annotated[float, Field(gt=0, le=1e6)]
+    rate_hz: Annotated[float, Field(gt=0, le=1e5)]
     gains: dict[str, GainSection]
 
 
@@ -296,9 +301,32 @@ def validated(data: dict[str, Any], where: str) -> Study:
         InvalidInputError: one line with the rule, what came, and what would do.
     """
     try:
+        numbers = list(_numbers(data))
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{where}: {error}") from None
+    for path, value in numbers:
+        if math.isfinite(value) and abs(value) > LARGEST:
+            raise InvalidInputError(
+                f"{where}: {path} must be within ±{LARGEST:g} in SI units: got {value:g}; check the unit"
+            )
+    try:
         return Study.model_validate(data)
     except ValidationError as error:
         raise InvalidInputError(f"{where}: {_one_line(error)}") from None
+
+
+def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    """Every number of a file with its place."""
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield from _numbers(value, f"{path}.{key}" if path else str(key))
+    elif isinstance(data, list):
+        for value in data:
+            yield from _numbers(value, path)
+    elif isinstance(data, bool) and not path.endswith("worst_case"):
+        raise InvalidInputError(f"{path} must be a number or text: got {str(data).lower()}; correct the value")
+    elif isinstance(data, int | float):
+        yield path, float(data) if isinstance(data, float) or abs(data) < 10**300 else math.copysign(1e300, data)
 
 
 def _one_line(error: ValidationError) -> str:
@@ -321,6 +349,11 @@ def _one_line(error: ValidationError) -> str:
         return f"{path} must be a finite number: got {shown}; give a number"
     if kind == "literal_error":
         return f"{path} must be {first.get('ctx', {}).get('expected', 'a known word')}: got {shown}; choose one"
+    if kind == "too_short":
+        least = first.get("ctx", {}).get("min_length", 1)
+        return f"{path} must have at least {least} entries: got {shown}; add what is missing"
+    if kind == "tuple_type":
+        return f"{path} must be a list: got {shown}; put it in brackets"
     rule = first["msg"].replace("Input should be", "must be")
     return f"{path} {rule[0].lower()}{rule[1:]}: got {shown}; correct the value"
 

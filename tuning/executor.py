@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from types import TracebackType
 from typing import Any
 
@@ -12,11 +13,12 @@ _evaluate: Callable[[Any], Any] | None = None
 
 
 def _prepare(make: Callable[..., Callable[[Any], Any]], arguments: tuple[Any, ...]) -> None:
-    import signal
-
     global _evaluate
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     _evaluate = make(*arguments)
+
+
+def _ready() -> None:
+    """Nothing; its submission starts the processes."""
 
 
 def _call(item: Any) -> Any:
@@ -41,6 +43,12 @@ class Executor:
             self._pool = ProcessPoolExecutor(
                 jobs, mp_context=get_context("spawn"), initializer=_prepare, initargs=(make, arguments)
             )
+            # processes inherit an ignored Ctrl-C from their first instant on; it is this process that reacts to it
+            handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+            try:
+                self._pool.submit(_ready)
+            finally:
+                signal.signal(signal.SIGINT, handler)
 
     def map(self, items: Sequence[Any]) -> list[Any]:
         """Results in the order of the items."""
@@ -55,4 +63,7 @@ class Executor:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._pool is not None:
-            self._pool.shutdown(wait=kind is None, cancel_futures=True)
+            if kind is not None:
+                for child in active_children():
+                    child.terminate()
+            self._pool.shutdown(wait=True, cancel_futures=True)

@@ -220,6 +220,35 @@ def test_interrupted_design_keeps_its_state_and_resumes_to_the_same_file(designe
     assert not state.exists()
 
 
+@pytest.mark.parametrize("pause", [1.5, 5.0])
+def test_ctrl_c_ends_all_processes(designed, pause):
+    """A terminal sends the interrupt to the whole group, also while the processes are starting."""
+    folder, _ = designed
+    command = [
+        sys.executable,
+        "-m",
+        "hdmm_opt",
+        "design",
+        "small.toml",
+        "-o",
+        "cut.gains.json",
+        "--jobs",
+        "2",
+        "--budget",
+        "full",
+    ]
+    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    time.sleep(pause)
+    os.killpg(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130 and "Traceback" not in errors
+    with pytest.raises(ProcessLookupError):
+        for _ in range(100):
+            os.killpg(process.pid, 0)
+            time.sleep(0.1)
+    assert not (folder / "cut.gains.json").exists()
+
+
 def test_help_loads_no_heavy_library():
     code = "import sys; import hdmm_opt.cli; print([m for m in ('numpy', 'casadi', 'pydantic', 'cvxpy', 'scipy', 'rich') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
