@@ -229,7 +229,7 @@ def _sampling(problem: Problem, gains: tuple[Gains, ...]) -> list[Verdict]:
     if longest == 0.0:
         remedy = "no control period was found that would do; smaller gains in the last row would help"
     else:
-        remedy = f"a control period of at most {longest * 1e6:.4g} us ({1 / longest:.6g} Hz or faster) would do"
+        remedy = f"a control period of at most {longest * 1e6:.4g} us ({1 / longest:.6g} Hz or faster)"
     return [
         Verdict(
             name="sampling",
