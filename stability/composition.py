@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
 from typing import Any
@@ -336,8 +336,3 @@ class _Program:
         leak = np.where(r / w > 1e-6 * young / np.maximum(rows.mass_high, 1e-300), r / w, 0.0) * (self.gain.value > 0)
         weights = w / (scales**2 * rows.mass_high)
         return _Weights(weights / weights[0], young, leak)
-
-
-def with_period(bounds: Bounds, period: float) -> Bounds:
-    """The same assumptions at another control period."""
-    return replace(bounds, period=period)

@@ -11,9 +11,6 @@ from .interval import Interval
 
 T = TypeVar("T")
 
-UNARY = ("neg", "sq", "sqrt", "tanh")
-BINARY = ("add", "sub", "mul", "div")
-
 
 @dataclass(frozen=True, kw_only=True)
 class Expression:
