@@ -78,7 +78,7 @@ def violation(problem: Problem, found: Composition | Failure, gains: tuple[Gains
     late = sum(max(0.0, problem.bounds.period * g.delta * g.sigma - 1.0) for g in gains)
     if isinstance(found, Failure):
         return 10.0 + late
-    excess = (size * (1 + HEADROOM) / limit - 1.0 for _, size, limit, _ in slacks(problem, found))
+    excess = (size * (1 + HEADROOM) / limit - 1.0 if limit > 0 else 1.0 for _, size, limit, _ in slacks(problem, found))
     return late + sum(max(0.0, value) for value in excess)
 
 

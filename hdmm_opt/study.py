@@ -42,7 +42,7 @@ class ParameterSection(_Section):
 
     value: float
     unit: str
-    tolerance: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    tolerance: Annotated[float, Field(ge=0, lt=1)] | None = None
     source: Literal["table", "derived", "public", "assumed"]
 
 
@@ -71,8 +71,11 @@ class PlantSection(_Section):
         """All parameters of the plant, defaults included."""
         result = dict(defaults(self.level))
         for name, given in self.parameters.items():
-            meaning = result[name].meaning
-            result[name] = Parameter(**given.model_dump(), meaning=meaning)
+            default = result[name]
+            tolerance = default.tolerance if given.tolerance is None else given.tolerance
+            result[name] = Parameter(
+                value=given.value, unit=given.unit, tolerance=tolerance, source=given.source, meaning=default.meaning
+            )
         return result
 
 

@@ -324,7 +324,8 @@ class _Program:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Solution may be inaccurate", category=UserWarning)
             try:
-                self.problem.solve(solver=cp.CLARABEL)
+                # a warm start would make the answer depend on what this process solved before
+                self.problem.solve(solver=cp.CLARABEL, warm_start=False)
             except cp.SolverError:
                 return None
         if self.problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):

@@ -108,3 +108,20 @@ def test_a_simulation_outside_its_envelope_stops_everything(monkeypatch):
     chosen = study.validated(data, "test")
     with pytest.raises(DefectError, match="outside the certified"):
         pipeline.design(chosen, Options(), Progress())
+
+
+def test_a_certificate_does_not_depend_on_what_was_solved_before():
+    problem = assemble(study.load("emla-p2"))
+    gains = (Gains(beta=24.0), Gains(beta=6000.0))
+    answers = []
+    for before in ((Gains(beta=9.0), Gains(beta=9000.0)), (Gains(beta=30.0), Gains(beta=7000.0)), gains):
+        certificate(problem, before)
+        found = certificate(problem, gains)
+        answers.append((found.decay, *found.weights, *found.young, *found.radii, *found.ball))
+    assert answers[0] == answers[1] == answers[2]
+
+
+def test_a_tolerance_left_out_is_that_of_the_plant():
+    data = study.load("emla-p2").model_dump(exclude_none=True)
+    data["plant"]["parameters"]["load_mass"].pop("tolerance")
+    assert study.validated(data, "test").plant.resolved()["load_mass"].tolerance == 0.2
