@@ -107,7 +107,7 @@ class _Attack:
         """Loads of simple shapes, then the sign of each parameter by its own effect, then all together."""
         limit = max(2, int(STRUCTURED * self.budget))
         make = partial(Scenario, name="falsified", noise=1.0, initial=1.0, seed=self.seed)
-        shapes = self._loads()[: max(1, min(limit - 2 * len(self.names) - 2, self.budget - self.runs))]
+        shapes = self._loads()[: max(1, min(limit - 2 * len(self.names) - 4, self.budget - self.runs))]
         load = max(shapes, key=lambda points: self.error(make(load=points)))
         signs: dict[str, float] = {}
         for name in self.names:
@@ -115,9 +115,9 @@ class _Attack:
                 break
             errors = {s: self.error(make(load=load, parameters={name: s})) for s in (1.0, -1.0)}
             signs[name] = max(errors, key=errors.__getitem__)
-        for initial in (1.0, -1.0):
+        for initial, bias in ((1.0, 0.0), (-1.0, 0.0), (1.0, 1.0), (1.0, -1.0)):
             if self.runs < self.budget:
-                self.error(make(load=load, parameters=signs, initial=initial))
+                self.error(make(load=load, parameters=signs, initial=initial, bias=bias))
 
     def _loads(self) -> list[tuple[tuple[float, float], ...]]:
         low, high, end = self.low, self.high, self.end
@@ -143,7 +143,8 @@ class _Attack:
 
             found = self.worst[0]
             signs = [0.5 + 0.45 * found.parameters.get(name, 0.0) for name in self.names]
-            first = np.array([*signs, 0.5 + 0.45 * found.initial, *np.linspace(0.1, 0.9, SWITCHES), 0.5])
+            start = [0.5 + 0.45 * found.initial, 0.5 + 0.45 * found.bias]
+            first = np.array([*signs, *start, *np.linspace(0.1, 0.9, SWITCHES), 0.5])
             options = {"bounds": [0, 1], "seed": self.seed + 1, "verbose": -9, "maxfevals": left, "popsize": 8}
             search = cma.CMAEvolutionStrategy(first, 0.25, options)
             while self.runs + 8 <= self.budget:
@@ -151,16 +152,17 @@ class _Attack:
                 search.tell(points, [-self.error(self._scenario(np.asarray(p))) for p in points])
 
     def _scenario(self, point: Array) -> Scenario:
-        """A point of the unit cube: parameters, start, switching times, and which load comes first."""
+        """A point of the unit cube: parameters, start, bias, switching times, and which load comes first."""
         k = len(self.names)
         pushed = np.clip(1.2 * (2 * point - 1), -1, 1)
-        times = np.unique(np.sort(point[k + 1 : k + 1 + SWITCHES]) * self.end)
+        times = np.unique(np.sort(point[k + 2 : k + 2 + SWITCHES]) * self.end)
         first, second = (self.low, self.high) if point[-1] < 0.5 else (self.high, self.low)
         return Scenario(
             name="falsified",
             load=_switched(first, second, tuple(times)),
             parameters=dict(zip(self.names, pushed[:k].tolist(), strict=True)),
             noise=1.0,
+            bias=float(pushed[k + 1]),
             initial=float(pushed[k]),
             seed=self.seed,
         )

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from stability import Composition, Gains, checker
+from stability import Certificate, Composition, Gains, Sampled, checker
 from trajectories import Reference, Spline
 
 from .control import gain_columns
@@ -34,7 +34,7 @@ _MEANING = {
 def build(
     problem: Problem,
     gains: tuple[Gains, ...],
-    found: Composition,
+    found: Certificate,
     validation: dict[str, Any],
     provenance: dict[str, Any],
 ) -> dict[str, Any]:
@@ -67,7 +67,8 @@ def seal(document: dict[str, Any]) -> dict[str, Any]:
 
 def prove(document: dict[str, Any]) -> tuple[dict[str, Any], checker.Report]:
     """Fill in the obligations with the checker's verdicts, seal, and check the finished text."""
-    draft = {**document, "obligations": [{"name": name, "verdict": "proved"} for name in checker.REQUIRED["rac"]]}
+    required = checker.REQUIRED[document["controller"]["law"]][document["certificate"]["kind"]]
+    draft = {**document, "obligations": [{"name": name, "verdict": "proved"} for name in required]}
     report = checker.check_text(to_text(seal(draft)))
     entries = [
         {"name": o.name, "statement": o.statement, "margin": o.margin, "unit": o.unit, "verdict": o.verdict}
@@ -199,22 +200,32 @@ def _assumptions(problem: Problem) -> list[dict[str, Any]]:
     return [dict(zip(keys, entry, strict=True)) for entry in entries]
 
 
-def _certificate(problem: Problem, found: Composition) -> dict[str, Any]:
-    return {
-        "kind": "composition",
+def _certificate(problem: Problem, found: Certificate) -> dict[str, Any]:
+    composed = isinstance(found, Composition)
+    data: dict[str, Any] = {
+        "kind": "composition" if composed else "sampled",
         "model": problem.model.to_data(),
         "decay": short(found.decay),
-        "weights": [short(v) for v in found.weights],
-        "young": [short(v) for v in found.young],
-        "leak": [short(v) for v in found.leak],
         "radii": [short(v, up=True) for v in found.radii],
         "held": [short(v, up=True) for v in found.held],
         "envelope": {
             "initial": [short(v, up=True) for v in problem.bounds.initial],
-            "rate": short(0.4999999 * found.decay),
-            "ball": [short(v * (1 + 1e-6), up=True) for v in found.ball],
+            "rate": short((0.4999999 if composed else 0.9999999) * found.decay),
+            "ball": [short(v * (1 + 1e-5), up=True) for v in found.ball],
         },
     }
+    vectors = checker.VECTORS[data["kind"]]
+    if isinstance(found, Sampled):
+        data["split"] = list(found.split)
+        data["cells"] = [
+            {
+                "transform": [[short(v) for v in row] for row in cell.transform],
+                **{name: [short(v) for v in getattr(cell, name)] for name in vectors},
+            }
+            for cell in found.cells
+        ]
+        return data
+    return data | {name: [short(v) for v in getattr(found, name)] for name in vectors}
 
 
 def short(value: float, *, up: bool = False) -> str:

@@ -69,7 +69,7 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
         progress.stage("gains: JAYA")
         gains, evaluations = search(problem, chosen.gains, budget, seed, options, progress)
     progress.stage("proof")
-    found = certificate(problem, gains)
+    found = certificate(problem, gains, thorough=True)
     if isinstance(found, Failure) or violation(problem, found, gains) > 0:
         return _refused(problem, gains)
     progress.stage("validation")

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from stability import Composition, Failure, Gains, certify
+from stability import Certificate, Failure, Gains, certify, certify_sampled
 
 from .control import RAC
 from .problem import Problem
@@ -46,23 +46,35 @@ class Verdict:
     witness: dict[str, Any] | None = None
 
 
-def certificate(problem: Problem, gains: tuple[Gains, ...], *, period: float | None = None) -> Composition | Failure:
-    """Search a certificate at the study's control period, or at another one (0: a continuous law)."""
+def certificate(
+    problem: Problem, gains: tuple[Gains, ...], *, period: float | None = None, thorough: bool = False
+) -> Certificate | Failure:
+    """Search a certificate at the study's control period, or at another one (0: a continuous law).
+
+    The sampled certificate comes first. The composition is looked for where there is none, for a continuous law, and
+    where `thorough` asks for both; the one with the smaller bound among those that meet the limits is returned.
+    """
     bounds = problem.bounds if period is None else replace(problem.bounds, period=period)
-    found = certify(problem.model, bounds, gains, problem.box)
-    if not any(g.epsilon > 0 for g in gains):
-        return found
-    adaptive = certify(problem.model, bounds, gains, problem.box, adaptive=True)
-    return min((found, adaptive), key=lambda c: violation(problem, c, gains))
+    sampled = certify_sampled(problem.model, bounds, gains, problem.box)
+    if isinstance(sampled, Certificate) and not thorough:
+        return sampled
+    found = [sampled, certify(problem.model, bounds, gains, problem.box)]
+    if isinstance(sampled, Certificate):
+        found.append(certify_sampled(problem.model, bounds, gains, problem.box, refine=True))
+    if any(g.epsilon > 0 for g in gains):
+        found.append(certify(problem.model, bounds, gains, problem.box, adaptive=True))
+    return min(
+        found, key=lambda c: (violation(problem, c, gains), math.inf if isinstance(c, Failure) else float(c.ball[0]))
+    )
 
 
-def slacks(problem: Problem, found: Composition) -> list[tuple[str, float, float, str]]:
+def slacks(problem: Problem, found: Certificate) -> list[tuple[str, float, float, str]]:
     """Limits over the certified set as (name, certified size, limit, unit): norms, stroke, tracking error."""
-    rows, plant = found.rows, problem.plant
+    plant = problem.plant
     result = []
     for limit in plant.limits:
         sizes = [
-            rows.effort[plant.inputs.index(s)] if s in plant.inputs else rows.states[plant.states.index(s)]
+            found.effort[plant.inputs.index(s)] if s in plant.inputs else found.states[plant.states.index(s)]
             for s in limit.signals
         ]
         result.append((limit.name, float(np.linalg.norm(sizes)), limit.value, limit.unit))
@@ -73,7 +85,7 @@ def slacks(problem: Problem, found: Composition) -> list[tuple[str, float, float
     return result
 
 
-def violation(problem: Problem, found: Composition | Failure, gains: tuple[Gains, ...]) -> float:
+def violation(problem: Problem, found: Certificate | Failure, gains: tuple[Gains, ...]) -> float:
     """How far some gains are from being proved; 0 where a certificate exists and every limit holds over its set."""
     late = sum(max(0.0, problem.bounds.period * g.delta * g.sigma - 1.0) for g in gains)
     if isinstance(found, Failure):
@@ -113,8 +125,8 @@ def diagnose(problem: Problem, gains: tuple[Gains, ...]) -> list[Verdict]:
     return found
 
 
-def _authority(problem: Problem, gains: tuple[Gains, ...], continuous: Composition | Failure) -> list[Verdict]:
-    if isinstance(continuous, Composition):
+def _authority(problem: Problem, gains: tuple[Gains, ...], continuous: Certificate | Failure) -> list[Verdict]:
+    if isinstance(continuous, Certificate):
         worst = [entry for entry in slacks(problem, continuous) if entry[0] != "tracking error"]
         name, size, top, unit = max(worst, key=lambda entry: entry[1] / entry[2])
         if size <= top:
@@ -182,7 +194,7 @@ def largest_demand(problem: Problem, gains: tuple[Gains, ...]) -> tuple[float, S
     return demands[worst], found[worst]
 
 
-def _conditions(problem: Problem, continuous: Composition | Failure) -> list[Verdict]:
+def _conditions(problem: Problem, continuous: Certificate | Failure) -> list[Verdict]:
     if isinstance(continuous, Failure):
         row = continuous.row
         where = f" at subsystem {row + 1} ({problem.plant.states[row]})" if row is not None else ""
@@ -190,7 +202,7 @@ def _conditions(problem: Problem, continuous: Composition | Failure) -> list[Ver
             Verdict(
                 name="composition",
                 statement=f"the gain conditions of the continuous law: {continuous.reason}{where}",
-                margin=_row_margin(continuous),
+                margin=continuous.margin,
                 unit="1/s",
                 verdict="undecided",
                 remedy="separate the bandwidths (a larger gain in that row or a smaller one before it), add a "
@@ -207,18 +219,6 @@ def _conditions(problem: Problem, continuous: Composition | Failure) -> list[Ver
             remedy=f"larger gains, a narrower load range, or a requirement of {1.01 * size * 1e3:.3g} mm",
         )
     ]  # fmt: skip
-
-
-def _row_margin(failure: Failure) -> float:
-    """How much more decay the weakest row of the last iterate would need for diagonal dominance, 1/s; negative."""
-    if failure.rows is None:
-        return -math.inf
-    low, high, mass = failure.rows.low, failure.rows.high, failure.rows.mass_high
-    scale = np.ones(len(mass)) if failure.needed is None else failure.needed
-    size = np.maximum(np.abs(low), np.abs(high)) * scale[None, :] / scale[:, None]
-    np.fill_diagonal(size, 0.0)
-    spare = (-np.diag(high) - size.sum(axis=1)) / mass
-    return float(min(spare.min(), 0.0))
 
 
 def _sampling(problem: Problem, gains: tuple[Gains, ...]) -> list[Verdict]:

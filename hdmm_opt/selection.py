@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stability import Composition, Failure, Gains, checker, error_rows
+from stability import Certificate, Failure, Gains, certify, checker, error_rows
 from tuning import Executor, Outcome, SearchState, Selection, select, start, step
 
 from . import validation
@@ -74,6 +74,7 @@ def starting_point(problem: Problem) -> Selection:
         return Selection(gains=gains, certificate=certificate(problem, gains), rounds=1)
     return select(
         lambda gains: certificate(problem, gains),
+        lambda gains: certify(problem.model, replace(problem.bounds, period=0.0), gains, problem.box),
         lambda found: violation(problem, found, ()),
         bandwidth_ladder(problem),
         [(problem.ranges[4 * k].low, problem.ranges[4 * k].high) for k in range(count)],
@@ -139,7 +140,7 @@ def make_evaluator(study: Study) -> Callable[[Array], Outcome]:
     return evaluate
 
 
-def closed_loop_cost(problem: Problem, gains: tuple[Gains, ...], found: Composition, runs: list[Any]) -> float:
+def closed_loop_cost(problem: Problem, gains: tuple[Gains, ...], found: Certificate, runs: list[Any]) -> float:
     """Weighted RMS error, certified bound, ITAE and effort, each relative to its requirement or limit."""
     weights, required = problem.study.tuning.weights, problem.study.requirements.tracking_error_m
     duration = problem.reference.duration

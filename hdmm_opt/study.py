@@ -153,7 +153,7 @@ class ControllerSection(_Section):
     """The law, its rate and its gains."""
 
     law: Literal["rac"]
-    modelling: tuple[Literal["mechanics", "resistance", "back_emf", "decoupling"], ...] = ()
+    modelling: tuple[Literal["mechanics", "friction", "resistance", "back_emf", "decoupling"], ...] = ()
     rate_hz: Annotated[float, Field(gt=0, le=1e5)]
     gains: dict[str, GainSection]
 
@@ -196,6 +196,7 @@ class ScenarioSection(_Section):
     load_n: Annotated[tuple[Pair, ...], Field(min_length=1)]
     parameters: dict[str, Annotated[float, Field(ge=-1, le=1)]] = {}
     noise: Annotated[float, Field(ge=0, le=1)] = 0.0
+    bias: Annotated[float, Field(ge=-1, le=1)] = 0.0
     initial: Annotated[float, Field(ge=-1, le=1)] = 0.0
 
 

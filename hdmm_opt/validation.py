@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stability import Composition, Gains
+from stability import Certificate, Gains
 
 from .problem import Problem
 from .simulation import Metrics, Scenario, Trace, measure, scenarios
@@ -138,7 +138,8 @@ def worst_corner(problem: Problem, run: Callable[[Scenario], Metrics]) -> tuple[
         signs[name] = max(errors, key=errors.__getitem__)
     for key, load in loads.items():
         consider(Scenario(name=f"worst-{key}", load=load, parameters=signs))
-        consider(Scenario(name=f"worst-{key}", load=load, parameters=signs, noise=1.0, initial=1.0))
+        for bias in (0.0, 1.0, -1.0):
+            consider(Scenario(name=f"worst-{key}", load=load, parameters=signs, noise=1.0, bias=bias, initial=1.0))
     assert best is not None
     return best
 
@@ -185,7 +186,7 @@ def missed(study: Study, name: str, metrics: Metrics) -> list[str]:
     return found
 
 
-def to_data(problem: Problem, found: Validation, certificate: Composition) -> dict[str, Any]:
+def to_data(problem: Problem, found: Validation, certificate: Certificate) -> dict[str, Any]:
     """The `validation` section of a gain file."""
 
     def entry(scenario: Scenario, metrics: Metrics) -> dict[str, Any]:

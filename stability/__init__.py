@@ -1,8 +1,11 @@
 """Stability: bounds, gain conditions and certificates of strict-feedback loops, and their stand-alone checker."""
 
+from .certificate import Certificate as Certificate
+from .certificate import Failure as Failure
 from .composition import Composition as Composition
-from .composition import Failure as Failure
 from .composition import certify as certify
+from .deviation import DeviationRows as DeviationRows
+from .deviation import deviation_rows as deviation_rows
 from .expression import Expression as Expression
 from .expression import enclose as enclose
 from .expression import from_casadi as from_casadi
@@ -13,3 +16,5 @@ from .model import LoopModel as LoopModel
 from .model import Row as Row
 from .rows import ErrorRows as ErrorRows
 from .rows import error_rows as error_rows
+from .sampled import Sampled as Sampled
+from .sampled import certify_sampled as certify_sampled

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .certificate import Certificate, Failure
 from .model import Bounds, Gains, LoopModel
 from .rows import ErrorRows, error_rows
 
@@ -32,45 +33,20 @@ SLACK = 2e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Composition:
-    """Numbers that certify a closed loop, before the exact check.
+class Composition(Certificate):
+    """A composition certificate: the box and the ball bound the errors Q_i, `held` the input error.
 
     Attributes:
-        decay: Rate μ in 1/s.
         weights: w. Shape (n,).
         young: ν. Shape (n,).
         leak: p = ε θ*. Shape (n,).
-        radii: Assumed box |Q_i| <= radii_i. Shape (n,).
-        held: Assumed bounds on the input error. Shape (m,).
-        ball: Certified bounds on |Q_i| from the end of the transient on. Shape (n,).
         rows: The enclosures over the assumed box.
     """
 
-    decay: float
     weights: Array
     young: Array
     leak: Array
-    radii: Array
-    held: Array
-    ball: Array
     rows: ErrorRows
-
-
-@dataclass(frozen=True, kw_only=True)
-class Failure:
-    """Why no certificate was found.
-
-    Attributes:
-        reason: One line.
-        row: Index of the subsystem at which the conditions break, where one can be named.
-        needed: Radii that the last iterate asked for. Shape (n,).
-        rows: The last enclosures, where there are any.
-    """
-
-    reason: str
-    row: int | None = None
-    needed: Array | None = None
-    rows: ErrorRows | None = None
 
 
 def certify(
@@ -125,7 +101,7 @@ class _Search:
             found = None if decay is None else self._solve(rows, scales, decay)
             if found is None or decay is None:
                 return Failure(
-                    reason="the gain conditions hold for no weights", row=_weakest(rows), needed=radii, rows=rows
+                    reason="the gain conditions hold for no weights", row=_weakest(rows), margin=_lacking(rows, radii)
                 )
             needed, ball = self._radii(rows, found, decay)
             needed = np.minimum(needed, np.maximum(self.initial * ROOM, rowwise_radii(rows, radii)))
@@ -133,16 +109,16 @@ class _Search:
             if (needed * ROOM <= radii).all() and (rows.held * ROOM <= held).all():
                 return Composition(
                     decay=decay, weights=found.weights, young=found.young, leak=found.leak, radii=radii, held=held,
-                    ball=ball, rows=rows,
+                    ball=ball, effort=rows.effort, states=rows.states, rows=rows,
                 )  # fmt: skip
             if (needed > self.limit).any():
                 worst = int(np.argmax(needed / self.limit))
                 return Failure(
-                    reason="the certified set outgrows the operating box", row=worst, needed=needed, rows=rows
+                    reason="the certified set outgrows the operating box", row=worst, margin=_lacking(rows, needed)
                 )
             radii = np.where(needed * ROOM <= radii, radii, needed * WIDENING)
             held = np.where(rows.held * ROOM <= held, held, rows.held * WIDENING)
-        return Failure(reason=f"the box did not settle in {self.STEPS} iterations", needed=radii)
+        return Failure(reason=f"the box did not settle in {self.STEPS} iterations")
 
     def _scales(self) -> Array:
         """Unit of each error in which the program is well conditioned: each row's is that of its target times ½β."""
@@ -232,6 +208,14 @@ def initial_level(rows: ErrorRows, found: Any, initial: Array, epsilon: Array, d
 
 def _weakest(rows: ErrorRows) -> int:
     return int(np.argmax(np.diag(rows.high) / rows.mass_high))
+
+
+def _lacking(rows: ErrorRows, scale: Array) -> float:
+    """How much more decay the weakest row would need for diagonal dominance, 1/s; negative."""
+    size = np.maximum(np.abs(rows.low), np.abs(rows.high)) * scale[None, :] / scale[:, None]
+    np.fill_diagonal(size, 0.0)
+    spare = (-np.diag(rows.high) - size.sum(axis=1)) / rows.mass_high
+    return float(min(spare.min(), 0.0))
 
 
 def _golden(function: Any, low: float, high: float) -> float:

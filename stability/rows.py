@@ -68,10 +68,10 @@ def error_rows(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], radii
 
     Not guaranteed: that the box is invariant, or that `held` is large enough. The caller checks both.
     """
-    return _Builder(model, bounds, gains, radii, held).build()
+    return Builder(model, bounds, gains, radii, held).build()
 
 
-class _Builder:
+class Builder:
     """One pass over the rows, in the order in which they track each other."""
 
     def __init__(self, model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], radii: Array, held: Array) -> None:
@@ -101,6 +101,7 @@ class _Builder:
         self.model_term: dict[int, Form] = {}
 
     def build(self) -> ErrorRows:
+        """The enclosures."""
         n = len(self.model.rows)
         self._states()
         values = self._plant()
@@ -140,15 +141,15 @@ class _Builder:
         if target == "zero":
             return Form()
         self._virtual_control(int(target))
-        return Form.of(f"K{target}") + self.model_term[int(target)]
+        return self._control(int(target))
 
     def _virtual_control(self, i: int) -> None:
         """Bounds on θ̂_i, the gain interval [½β, ½B], the symbol K_i and the modelling term m_i."""
         if i in self.half_gain:
             return
-        gains, radius = self.gains[i], self.radii[i]
+        gains = self.gains[i]
         noise = self._noise(i)
-        peak = (radius + noise) ** 2
+        peak = (self._error(i) + noise) ** 2
         theta = gains.epsilon * peak / (2.0 * gains.sigma) * (1 + 1e-12)
         rate = max(gains.delta * gains.sigma * theta, 0.5 * gains.epsilon * gains.delta * peak) * (1 + 1e-12)
         half = Interval(0.5) * Interval(gains.beta, gains.beta + gains.epsilon * theta * (1 + 1e-12))
@@ -158,6 +159,10 @@ class _Builder:
         self.symbols.ranges[f"K{i}"] = self.symbols.range_of(definition)
         self.model_term[i] = evaluate(self.terms[i], self.inputs, self.symbols)[0].form
 
+    def _error(self, i: int) -> float:
+        """Bound on |Q_i|."""
+        return self.radii[i]
+
     def _noise(self, i: int) -> float:
         """Bound on the error of the Q_i that the controller computes."""
         target = self.model.rows[i].target
@@ -165,8 +170,7 @@ class _Builder:
         if isinstance(target, str):
             self.noise[i] = own
             return own
-        upstream = self.half_gain[target].high * self.noise[target] + self._term_noise(target)
-        self.noise[i] = (own + upstream) * (1 + 1e-12)
+        self.noise[i] = (own + self._control_noise(target)) * (1 + 1e-12)
         return self.noise[i]
 
     def _ranges(self) -> dict[str, Interval]:
@@ -184,9 +188,13 @@ class _Builder:
         }
         return tangent(self.terms[i], self._ranges(), tangents).constant.magnitude
 
+    def _control(self, row: int) -> Form:
+        """The part of an input that is not its error e."""
+        return Form.of(f"K{row}") + self.model_term[row]
+
     def _plant(self) -> list[Value]:
         for k, (name, row) in enumerate(zip(self.model.inputs, self.model.drives, strict=True)):
-            form = Form.of(f"K{row}") + self.model_term[row] + Form.of(f"e{k}")
+            form = self._control(row) + Form.of(f"e{k}")
             self.inputs[name] = self.symbols.value(name, form)
         return evaluate(self.model.plant, self.inputs, self.symbols)
 
@@ -205,8 +213,7 @@ class _Builder:
             rows.append(forces[i] - target_rate.scaled(masses[i]))
             if i in self.gains:
                 term_rate = self.symbols.expand(tangent(self.terms[i], ranges, tangents), keep="K")
-                error_rate = rows[i].scaled(ONE / masses[i])
-                virtual[i] = self._virtual_rate(i, error_rate) + term_rate
+                virtual[i] = self._virtual_rate(i, rows[i].scaled(ONE / masses[i])) + term_rate
         return rows, virtual
 
     def _virtual_rate(self, i: int, error_rate: Form) -> Form:
@@ -216,16 +223,17 @@ class _Builder:
     def _held(self, row: int, virtual_rate: Form) -> float:
         """T_s sup|κ'| plus the noise that reaches the input."""
         sup = self.symbols.range_of(self.symbols.expand(virtual_rate)).magnitude
-        noise = self.half_gain[row].high * self.noise[row] + self._term_noise(row)
-        return (self.bounds.period * sup + noise) * (1 + 1e-12)
+        return (self.bounds.period * sup + self._control_noise(row)) * (1 + 1e-12)
+
+    def _control_noise(self, row: int) -> float:
+        """What measurement errors make of κ."""
+        return self.half_gain[row].high * self.noise[row] + self._term_noise(row)
 
     def _effort(self, row: int) -> float:
-        noise = self.half_gain[row].high * self.noise[row] + self._term_noise(row)
-        form = Form.of(f"K{row}") + self.model_term[row]
-        return (self.symbols.range_of(form).magnitude + noise) * (1 + 1e-12)
+        return (self.symbols.range_of(self._control(row)).magnitude + self._control_noise(row)) * (1 + 1e-12)
 
-    def _disturbance(self, form: Form) -> float:
-        rest = {s: c for s, c in form.coefficients.items() if not s.startswith("Q")}
+    def _disturbance(self, form: Form, moving: str = "Q") -> float:
+        rest = {s: c for s, c in form.coefficients.items() if s[0] not in moving}
         return self.symbols.range_of(Form(rest, form.constant)).magnitude
 
     def _residual(self, i: int, row: Form, mass: Interval) -> float:

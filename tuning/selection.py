@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stability import Composition, Failure, Gains
+from stability import Certificate, Composition, Failure, Gains
 
 Array = NDArray[np.float64]
-Certify = Callable[[tuple[Gains, ...]], Composition | Failure]
+Certify = Callable[[tuple[Gains, ...]], Certificate | Failure]
+Compose = Callable[[tuple[Gains, ...]], Composition | Failure]
 
 #: Largest factor by which one alternation may change a gain.
 TRUST = 1.35
@@ -35,13 +36,14 @@ class Selection:
     """
 
     gains: tuple[Gains, ...]
-    certificate: Composition | Failure
+    certificate: Certificate | Failure
     rounds: int
 
 
 def select(
     certify: Certify,
-    violation: Callable[[Composition | Failure], float],
+    compose: Compose,
+    violation: Callable[[Certificate | Failure], float],
     candidates: list[tuple[Gains, ...]],
     ranges: list[tuple[float, float]],
     target: float,
@@ -52,6 +54,7 @@ def select(
 
     Args:
         certify: Certificate search for given gains.
+        compose: Composition certificate of the continuous law, whose weights the convex program needs.
         violation: How far a certificate is from all obligations; 0 where they hold.
         candidates: Gains to try first.
         ranges: Admissible range of each β. Length k.
@@ -66,9 +69,10 @@ def select(
     solved = 0
     gains, found = best
     for _ in range(rounds):
-        if isinstance(found, Failure):
+        composed = compose(gains)
+        if isinstance(composed, Failure):
             break
-        proposal = smaller_gains(found, gains, ranges, target)
+        proposal = smaller_gains(composed, gains, ranges, target)
         solved += 1
         if proposal is None:
             break
@@ -78,7 +82,7 @@ def select(
     return Selection(gains=best[0], certificate=best[1], rounds=solved)
 
 
-def _rank(found: Composition | Failure, violation: Callable[[Composition | Failure], float]) -> tuple[float, float]:
+def _rank(found: Certificate | Failure, violation: Callable[[Certificate | Failure], float]) -> tuple[float, float]:
     return (violation(found), math.inf if isinstance(found, Failure) else float(found.ball[0]))
 
 

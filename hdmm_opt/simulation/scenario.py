@@ -22,6 +22,7 @@ class Scenario:
         load: Breakpoints (time in s, load in N), linear between them, constant outside.
         parameters: Position of plant parameters in their tolerance, -1 … 1; nominal where not named.
         noise: Share of the assumed measurement error, uniformly distributed, 0 … 1.
+        bias: Share of the assumed measurement error that is constant, -1 … 1; the random part has the rest.
         initial: Position of the first error in its assumed range, -1 … 1.
         seed: Seed of the noise.
     """
@@ -30,6 +31,7 @@ class Scenario:
     load: tuple[tuple[float, float], ...]
     parameters: Mapping[str, float] = field(default_factory=dict)
     noise: float = 0.0
+    bias: float = 0.0
     initial: float = 0.0
     seed: int = 0
 
@@ -41,14 +43,15 @@ class Scenario:
     def noise_at(self, count: int, bounds: Array) -> Array:
         """Measurement errors. Shape (n, count)."""
         draws = np.random.default_rng(self.seed).uniform(-1.0, 1.0, (bounds.size, count))
-        return self.noise * bounds[:, None] * draws
+        return bounds[:, None] * (self.bias + self.noise * (1 - abs(self.bias)) * draws)
 
 
 def scenarios(study: Study) -> list[Scenario]:
     """The scenarios of a study."""
     return [
         Scenario(
-            name=s.name, load=s.load_n, parameters=s.parameters, noise=s.noise, initial=s.initial,
+            name=s.name, load=s.load_n, parameters=s.parameters, noise=s.noise, bias=s.bias,
+            initial=s.initial,
             seed=study.tuning.seed + k,
         )
         for k, s in enumerate(study.validation.scenarios)

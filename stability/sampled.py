@@ -1,0 +1,298 @@
+"""The sampled certificate: a comparison system for the exact zero-order-hold map of the loop.
+
+In coordinates y = W z in which the nominal map over a period is nearly triangular and positive (see `period.py`), |y|
+obeys
+
+    |y(t + T)| <= A_v |y(t)| + b_v      at every vertex v of the uncertain inertias,
+
+so that any R with A_v R + b_v <= R is never left (R the ultimate set, P >= |y(0)| the set that is never left), and
+s >= P - R with A_v s <= (1 - μT) s tells how fast R is approached: a vector Lyapunov function (Bellman 1962;
+Siljak 1978, ch. 2), here for sampled data. No matrix inequality is needed. Inertias are constant, so their ranges may
+be split into cells with a certificate each.
+
+Nothing here proves anything; `checker.py` does, in exact arithmetic.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .certificate import Certificate, Failure
+from .deviation import DeviationRows, deviation_rows
+from .model import Bounds, Gains, LoopModel
+from .period import Map, comparison, coordinates
+
+Array = NDArray[np.float64]
+
+#: The assumed box grows by this factor over what an iterate needs, and is accepted once it keeps this room.
+WIDENING, ROOM = 1.004, 1.001
+#: Share of the contraction that R gives away, so that the exact check, which rounds outwards, is strict.
+SPARE = 1e-3
+#: Digits of W, which the file carries as short rationals.
+DIGITS = 9
+#: A refined certificate splits the range of an inertia in two where half its width is more than this share of it.
+SPLIT = 0.06
+#: Rates of approach that are tried, as shares of the slowest contraction.
+APPROACHES = (0.5, 0.7, 0.8, 0.9, 0.95, 0.98)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """The certificate for a part of the inertias' ranges.
+
+    Attributes:
+        transform: W. Shape (n, n).
+        reach: R, ultimate bounds on |y|. Shape (n,).
+        start: P, bounds on |y| at every sample. Shape (n,).
+        shape: s, what of P lies outside R and shrinks with the decay. Shape (n,).
+    """
+
+    transform: Array
+    reach: Array
+    start: Array
+    shape: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sampled(Certificate):
+    """A sampled certificate: the box and the ball bound the deviations z_i, `held` the inputs v_k.
+
+    Attributes:
+        split: Number of equal parts of each inertia's range. Length n.
+        cells: A certificate for each combination of parts, the last index running fastest.
+    """
+
+    split: tuple[int, ...]
+    cells: tuple[Cell, ...]
+
+
+def certify_sampled(
+    model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], limit: Array, *, refine: bool = False
+) -> Sampled | Failure:
+    """Search a sampled certificate for fixed gains.
+
+    Args:
+        model: Plant and law.
+        bounds: Assumptions, with a positive period.
+        gains: One for each governed row.
+        limit: Largest admissible box, |z_i| <= limit_i. Shape (n,).
+        refine: Split the inertias and improve the coordinates by a local search; tighter, and much slower.
+
+    Returns:
+        The numbers, or why there are none.
+
+    Not guaranteed: optimality; proof (see `checker.py`). Loops with complex poles far from the real axis have no
+    positive comparison system and fail here.
+    """
+    if not bounds.period > 0:
+        return Failure(reason="a sampled certificate needs a control period above 0")
+    search = _Search(model, bounds, gains, limit)
+    try:
+        found = search.run((1,) * len(model.rows))
+        if not refine or isinstance(found, Failure):
+            return found
+        rows = search.rows(found.radii, found.held)
+        split = tuple(2 if wide else 1 for wide in (rows.mass_high - rows.mass_low) / 2 > SPLIT * rows.mass_low)
+        better = search.run(split)
+        if isinstance(better, Sampled):
+            better = search.run(split, search.refined(better))
+        return better if isinstance(better, Sampled) and better.ball[0] < found.ball[0] else found
+    except np.linalg.LinAlgError:
+        return Failure(reason="the coordinates of the comparison system are singular")
+    except (ZeroDivisionError, ValueError, OverflowError) as error:
+        return Failure(reason=f"the model cannot be bounded over the box: {error}")
+
+
+@dataclass(frozen=True)
+class _Bounds:
+    """What one cell needs of the box, and certifies."""
+
+    cell: Cell
+    rows: DeviationRows
+    image: Map
+    decay: float
+    needed: Array
+    inputs: Array
+
+
+class _Search:
+    """Fixed point of box -> enclosures -> comparison systems -> box."""
+
+    STEPS = 120
+
+    def __init__(self, model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], limit: Array) -> None:
+        self.model, self.bounds, self.gains, self.limit = model, bounds, gains, limit
+        self.initial, self.period = np.array(bounds.initial), bounds.period
+
+    def rows(self, radii: Array, held: Array) -> DeviationRows:
+        return deviation_rows(self.model, self.bounds, self.gains, radii, held)
+
+    def run(self, split: tuple[int, ...], fixed: list[Array] | None = None) -> Sampled | Failure:
+        n, m = len(self.model.rows), len(self.model.inputs)
+        radii, held = np.maximum(self.initial, 1e-9 * self.limit), np.full(m, 1e-9)
+        transforms = fixed
+        for step in range(self.STEPS):
+            rows = self.rows(radii, held)
+            parts = cells_of(rows, split)
+            if transforms is None or (fixed is None and step in (2, 5, 9)):
+                transforms = [rounded(coordinates(self.model, part, self.period)) for part in parts]
+            found = [self._cell(part, w, radii, held) for part, w in zip(parts, transforms, strict=True)]
+            solved = [entry for entry in found if isinstance(entry, _Bounds)]
+            if len(solved) < len(found):
+                return next(entry for entry in found if isinstance(entry, Failure))
+            needed = np.max([entry.needed for entry in solved], axis=0)
+            inputs = np.max([entry.inputs for entry in solved], axis=0)
+            if (needed * ROOM <= radii).all() and (inputs * ROOM <= held).all():
+                decay = min(entry.decay for entry in solved)
+                ball = np.max([self._ball(entry, decay, radii, held) for entry in solved], axis=0)
+                return Sampled(
+                    decay=decay, radii=radii, held=held, ball=np.minimum(ball, radii),
+                    effort=rows.feedforward + held, states=rows.states, split=split,
+                    cells=tuple(entry.cell for entry in solved),
+                )  # fmt: skip
+            if (needed > self.limit).any():
+                worst = int(np.argmax(needed / self.limit))
+                return Failure(reason="the certified set outgrows the operating box", row=worst)
+            radii = np.where(needed * ROOM <= radii, radii, needed * WIDENING)
+            held = np.where(inputs * ROOM <= held, held, inputs * WIDENING)
+        return Failure(reason=f"the box did not settle in {self.STEPS} iterations", row=n - 1)
+
+    def _cell(self, rows: DeviationRows, transform: Array, radii: Array, held: Array) -> _Bounds | Failure:
+        n = len(radii)
+        image = comparison(rows, self.period, transform)
+        reach = least_reach(image.vertices)
+        if reach is None:
+            return Failure(reason="the sampled loop has no positive comparison system that contracts", row=n - 1)
+        start = least_reach([*image.vertices, (np.zeros((n, n)), self._start(transform, rows))])
+        if start is None:
+            return Failure(reason="the initial errors lead out of every contracting set", row=n - 1)
+        start = np.maximum(start, reach)
+        shape, decay = self._approach(image, reach, start)
+        return _Bounds(
+            cell=Cell(transform=transform, reach=reach, start=start, shape=shape),
+            rows=rows,
+            image=image,
+            decay=decay,
+            needed=self._between(rows, image, start, radii, held),
+            inputs=image.control @ start,
+        )
+
+    def _ball(self, found: _Bounds, decay: float, radii: Array, held: Array) -> Array:
+        """Bounds on |z| after the transient."""
+        left = math.exp(-decay * max(0.0, self.bounds.transient - self.period))
+        late = np.minimum(found.cell.reach + found.cell.shape * left, found.cell.start)
+        return self._between(found.rows, found.image, late, radii, held)
+
+    def _approach(self, image: Map, reach: Array, start: Array) -> tuple[Array, float]:
+        """The s >= P - R and its rate μ that leave the least error after the transient."""
+        excess = start - reach
+        push = np.maximum(excess, 1e-9 * (np.max(excess) or 1.0))
+        radius = max(float(np.max(np.abs(np.linalg.eigvals(a)))) for a, _ in image.vertices)
+        after = max(0.0, self.bounds.transient - self.period)
+        best, least = (push, 0.0), math.inf
+        for share in APPROACHES:
+            factor = 1 - share * (1 - radius)
+            shape = least_reach([(a / factor, push) for a, _ in image.vertices])
+            if shape is None:
+                continue
+            decay = (1 - factor) * (1 - 1e-9) / self.period
+            late = reach[0] + shape[0] * math.exp(-decay * after)
+            if late < least:
+                best, least = (shape, decay), late
+        return best
+
+    def refined(self, found: Sampled) -> list[Array]:
+        """Coordinates with a smaller reach of y_1 in each cell over the box of a certificate."""
+        parts = cells_of(self.rows(found.radii, found.held), found.split)
+        return [self._turned(part, cell) for part, cell in zip(parts, found.cells, strict=True)]
+
+    def _turned(self, rows: DeviationRows, cell: Cell) -> Array:
+        """Mix the coordinates y_2 … y_n by a local search (Nelder and Mead 1965)."""
+        from scipy.optimize import minimize
+
+        n = len(cell.reach)
+        free = [(i, j) for i in range(1, n) for j in range(n) if i != j]
+        if not free:
+            return cell.transform
+
+        def mixed(point: Array) -> Array:
+            mixing = np.eye(n)
+            for (i, j), value in zip(free, point, strict=True):
+                mixing[i, j] = value * cell.reach[i] / cell.reach[j]
+            return rounded(mixing @ cell.transform)
+
+        def cost(point: Array) -> float:
+            try:
+                reach = least_reach(comparison(rows, self.period, mixed(point)).vertices)
+            except np.linalg.LinAlgError:
+                return 1e6
+            return 1e6 if reach is None else float(reach[0] / cell.reach[0])
+
+        simplex = np.vstack([np.zeros(len(free)), 0.05 * np.eye(len(free))])
+        options = {"maxfev": 40 * len(free), "fatol": 1e-4, "xatol": 1e-3, "initial_simplex": simplex}
+        return mixed(minimize(cost, simplex[0], method="Nelder-Mead", options=options).x)
+
+    def _start(self, transform: Array, rows: DeviationRows) -> Array:
+        """|y(0)| over the initial errors Q(0)."""
+        back = np.eye(len(self.initial))
+        for i, row in enumerate(self.model.rows):
+            if isinstance(row.target, int):
+                back[i, row.target] -= rows.start[i]
+        return np.abs(transform @ back) @ self.initial
+
+    def _between(self, rows: DeviationRows, image: Map, top: Array, radii: Array, held: Array) -> Array:
+        """Bounds on |z(t)| for all t, between samples too."""
+        at_samples = np.abs(image.inverse) @ top
+        moved = image.motion[0] @ top + image.motion[1]
+        return at_samples + np.minimum(moved, self.period / 2 * rates(rows, radii, held, self.period))
+
+
+def cells_of(rows: DeviationRows, split: tuple[int, ...]) -> list[DeviationRows]:
+    """The enclosures with each inertia's range cut into equal parts, every combination."""
+    low, width = rows.mass_low, (rows.mass_high - rows.mass_low) / np.array(split)
+    parts = []
+    for index in product(*(range(count) for count in split)):
+        begin = low + np.array(index) * width
+        parts.append(replace(rows, mass_low=begin, mass_high=begin + width))
+    return parts
+
+
+def rates(rows: DeviationRows, radii: Array, held: Array, period: float) -> Array:
+    """Bounds on |z_i'| over the box. Shape (n,)."""
+    size = np.maximum(np.abs(rows.low), np.abs(rows.high)) @ radii
+    inputs = held + rows.noise + period * rows.drift
+    size = size + np.maximum(np.abs(rows.input_low), np.abs(rows.input_high)) @ inputs + rows.disturbance
+    return size / rows.mass_low
+
+
+def rounded(matrix: Array) -> Array:
+    """The matrix with short decimals, as a file carries it."""
+    return np.array([[float(f"{v:.{DIGITS - 1}e}") for v in row] for row in matrix])
+
+
+def least_reach(vertices: list[tuple[Array, Array]]) -> Array | None:
+    """The smallest R with A_v R + b_v <= R at every vertex, a little enlarged; None where there is none.
+
+    Policy iteration: in each row the vertex that asks for most.
+    """
+    n = len(vertices[0][1])
+    stack, push = np.array([a for a, _ in vertices]), np.array([b for _, b in vertices])
+    reach, extra = np.zeros(n), np.zeros(n)
+    for _ in range(50):
+        choice = (stack @ reach + push).argmax(axis=0)
+        a, b = stack[choice, np.arange(n)], push[choice, np.arange(n)]
+        radius = float(np.max(np.abs(np.linalg.eigvals(a))))
+        if not radius < 1:
+            return None
+        found = np.asarray(np.linalg.solve(np.eye(n) - a, b + extra), dtype=np.float64)
+        if np.allclose(found, reach, rtol=1e-9, atol=0.0):
+            if extra.any():
+                return found if (found > 0).all() else None
+            extra = SPARE * (1 - radius) * np.maximum(found, 1e-12 * found.max())
+        reach = found
+    return None
