@@ -21,6 +21,8 @@ from .simulation import ClosedLoop, Scenario, scenarios
 
 #: Limits and requirements must hold with this relative room, so that the exact check, which rounds outwards, agrees.
 HEADROOM = 2e-4
+#: How many times the study's control period a certificate is looked for.
+LONGEST = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,17 +97,23 @@ def violation(problem: Problem, found: Certificate | Failure, gains: tuple[Gains
 
 
 def longest_period(problem: Problem, gains: tuple[Gains, ...], *, steps: int = 12) -> float:
-    """The largest control period at which everything is certified, s, by bisection from below; 0 where none is."""
+    """The largest control period at which everything is certified, s, by bisection; 0 where none is.
+
+    Certified at the period returned, not certified at one a little longer; beyond, nothing is said.
+    """
 
     def good(period: float) -> bool:
         return violation(problem, certificate(problem, gains, period=period), gains) == 0.0
 
-    high = problem.bounds.period
-    low = high / 2.0**steps
-    if not good(low):
-        return 0.0
+    low = high = problem.bounds.period
     if good(high):
-        return high
+        while good(2 * high) and high < LONGEST * problem.bounds.period:
+            high *= 2
+        low, high = high, 2 * high
+    else:
+        low = high / 2.0**steps
+        if not good(low):
+            return 0.0
     for _ in range(steps):
         middle = math.sqrt(low * high)
         low, high = (middle, high) if good(middle) else (low, middle)

@@ -6,6 +6,8 @@ import pytest
 from hypothesis import settings
 
 from hdmm_opt import gain_file
+from hdmm_opt.problem import assemble, study_of
+from stability import Composition, Gains, certify
 
 # Timing is no property of the code, and a seed that changes is no test.
 settings.register_profile("project", deadline=None, derandomize=True)
@@ -24,6 +26,28 @@ def gain_text() -> str:
 def document(gain_text: str) -> dict:
     """The same as data, free to be changed."""
     return copy.deepcopy(json.loads(gain_text))
+
+
+@pytest.fixture(scope="session")
+def composed_text(gain_text: str) -> str:
+    """A file of emla-p2 whose certificate is a composition, at gains that leave it room."""
+    document = json.loads(gain_text)
+    problem = assemble(study_of(document["study"]))
+    gains = (
+        Gains(beta=24.35, epsilon=1.045, delta=0.4057, sigma=36.09),
+        Gains(beta=7188.0, epsilon=7.155, sigma=39.69),
+    )
+    found = certify(problem.model, problem.bounds, gains, problem.box)
+    assert isinstance(found, Composition)
+    text, report = gain_file.prove(gain_file.build(problem, gains, found, document["validation"], {}))
+    assert report.status == 0
+    return gain_file.to_text(text)
+
+
+@pytest.fixture
+def composed(composed_text: str) -> dict:
+    """The same as data, free to be changed."""
+    return json.loads(composed_text)
 
 
 @pytest.fixture(scope="session")

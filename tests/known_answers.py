@@ -5,8 +5,22 @@ from fractions import Fraction
 import casadi as ca
 import numpy as np
 
-from stability import Bounds, Composition, Failure, Gains, Interval, LoopModel, Row, certify, checker, from_casadi
-from stability.checker import Claim
+from stability import (
+    Bounds,
+    Certificate,
+    Composition,
+    Failure,
+    Gains,
+    Interval,
+    LoopModel,
+    Row,
+    Sampled,
+    certify,
+    certify_sampled,
+    checker,
+    from_casadi,
+)
+from stability.checker import Cell, Claim
 
 #: Theory §3: |w| of the oracle loops, m/s².
 DISTURBANCE = 0.816
@@ -62,13 +76,25 @@ def certify_chain(bandwidths: tuple[float, ...], **assumed: float) -> Compositio
     return certify(integrator_chain(order, unit=unit), chain_bounds(order, **assumed), gains, limit)
 
 
+def certify_sampled_chain(
+    bandwidths: tuple[float, ...], *, refine: bool = False, **assumed: float
+) -> Sampled | Failure:
+    """The same by the exact zero-order-hold map."""
+    order, unit = len(bandwidths), assumed.get("unit", 1.0)
+    limit = unit * np.array([0.05, 1.0, 100.0])[:order]
+    gains = tuple(Gains(beta=2.0 * w) for w in bandwidths)
+    return certify_sampled(
+        integrator_chain(order, unit=unit), chain_bounds(order, **assumed), gains, limit, refine=refine
+    )
+
+
 def fraction(value: float) -> Fraction:
     """A short rational near a float."""
     return Fraction(f"{value:.9e}")
 
 
 def claim_of(
-    model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], found: Composition, *, accuracy: float = 1e3,
+    model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], found: Certificate, *, accuracy: float = 1e3,
     limit: float = 1e9,
 ) -> Claim:  # fmt: skip
     """What the checker would read from a file about this certificate; generous limits."""
@@ -80,6 +106,9 @@ def claim_of(
         data = expression.to_data()  # type: ignore[attr-defined]
         return {"operations": data["operations"], "outputs": data["outputs"]}
 
+    composed = isinstance(found, Composition)
+    sampled = found if isinstance(found, Sampled) else None
+    smallest = 1e-6 * found.radii[-1] * gains[-1].beta if composed else 0.0
     return Claim(
         rows=model.to_data()["rows"],
         drives=list(model.drives),
@@ -94,13 +123,22 @@ def claim_of(
         initial=[Fraction(v) for v in bounds.initial],
         period=Fraction(bounds.period) if bounds.period else Fraction(1, 10**9),
         gains=[tuple(Fraction(v) for v in (g.beta, g.epsilon, g.delta, g.sigma)) for g in gains],
+        kind="composition" if composed else "sampled",
         decay=fraction(found.decay),
-        weights=[fraction(v) for v in found.weights],
-        young=[fraction(v) for v in found.young],
-        leak=[fraction(v) for v in found.leak],
+        vectors={
+            name: [fraction(v) for v in getattr(found, name)] for name in checker.VECTORS["composition"] if composed
+        },
+        split=list(sampled.split) if sampled else [],
+        cells=[
+            Cell(
+                [[fraction(v) for v in row] for row in cell.transform],
+                *([fraction(v) for v in getattr(cell, name)] for name in checker.VECTORS["sampled"]),
+            )
+            for cell in (sampled.cells if sampled else ())
+        ],
         radii=[fraction(v) for v in found.radii],
-        held=[fraction(max(v, 1e-6 * found.radii[-1] * gains[-1].beta)) for v in found.held],
-        ball=[fraction(v * (1 + 1e-6)) for v in found.ball],
+        held=[fraction(max(v, smallest)) for v in found.held],
+        ball=[fraction(v * (1 + 1e-5)) for v in found.ball],
         limits=[{"name": "input", "signals": list(model.inputs), "value": Fraction(limit), "unit": "1"}],
         stroke=(Fraction(-(10**12)), Fraction(10**12)),
         accuracy=Fraction(accuracy),

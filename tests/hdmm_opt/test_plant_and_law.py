@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -130,7 +131,7 @@ def test_the_amplitude_limit_scales_the_vector():
 
 def test_modelling_terms_cancel_the_plant_at_nominal_values():
     """With all electrical terms, L i' = -½β Q exactly; with mechanics, x'' equals the reference's at zero error."""
-    law = RAC(plant=build("voltage"), modelling=("mechanics", "resistance", "back_emf", "decoupling"))
+    law = RAC(plant=build("voltage"), modelling=("mechanics", "friction", "resistance", "back_emf", "decoupling"))
     nominal = ca.DM(list(law.plant.values().values()))
     x, r, load = ca.DM([0.2, 0.05, 22.0, -3.0]), ca.DM([0.2, 0.05, 0.1, 0.3]), ca.DM([60e3])
     terms = [float(ca.evalf(ca.SX(t))) for t in law.terms(ca.SX(x), ca.SX(r), ca.SX(nominal), ca.SX(load))]
@@ -139,6 +140,9 @@ def test_modelling_terms_cancel_the_plant_at_nominal_values():
     mechanical = rate(law.plant, ca.DM([0.2, 0.05, terms[1], 0.0]), [0, 0], load)[1]
     assert mechanical == pytest.approx(0.1, rel=1e-12)
     assert terms[0] == pytest.approx(0.05)
+    plain = replace(law, modelling=("mechanics",)).terms(ca.SX(x), ca.SX(r), ca.SX(nominal), ca.SX(load))[1]
+    screw = law.plant.parameters["transmission"].value * 60e3 / (1.5 * 4 * law.plant.parameters["flux"].value)
+    assert screw < float(ca.evalf(ca.SX(plain))) < terms[1]  # acceleration and viscous friction, but no loss
 
 
 def test_terms_that_do_not_fit_are_refused():
@@ -146,7 +150,9 @@ def test_terms_that_do_not_fit_are_refused():
         RAC(plant=build("torque"), modelling=("thermal",))
     with pytest.raises(ValueError, match="leave the term out"):
         RAC(plant=build("torque"), modelling=("back_emf",))
-    assert set(MODELLING) == {"mechanics", "resistance", "back_emf", "decoupling"}
+    with pytest.raises(ValueError, match='put "mechanics" beside it'):
+        RAC(plant=build("torque"), modelling=("friction",))
+    assert set(MODELLING) == {"mechanics", "friction", "resistance", "back_emf", "decoupling"}
 
 
 def test_effort_is_the_inverse_of_the_plant():

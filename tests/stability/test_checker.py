@@ -39,7 +39,7 @@ def test_the_committed_file_is_proved_by_the_checker_alone(tmp_path, gain_text):
     assert alone("bad.json").returncode == 2
     assert alone("missing.json").returncode == 2
     rows = json.loads(alone("good.json", "--json").stdout)
-    assert [o["name"] for o in rows[0]["obligations"]] == list(checker.REQUIRED["rac"])
+    assert [o["name"] for o in rows[0]["obligations"]] == list(checker.REQUIRED["rac"]["sampled"])
 
 
 def walk(node, path=()):
@@ -110,6 +110,18 @@ def rational(key, factor, index=None):
             holder[key] = str(Fraction(holder[key]) * factor)
         else:
             holder[key][index] = str(Fraction(holder[key][index]) * factor)
+
+    return change
+
+
+def in_cell(key, factor, *path):
+    """Scale a number of the first cell of a sampled certificate."""
+
+    def change(data):
+        holder = data["certificate"]["cells"][0][key]
+        for index in path[:-1]:
+            holder = holder[index]
+        holder[path[-1]] = str(Fraction(holder[path[-1]]) * factor)
 
     return change
 
@@ -255,11 +267,26 @@ MUTATIONS = {
     "negative box": rational("radii", Fraction(-1), 1),
     "smaller held error": rational("held", Fraction(9, 10), 0),
     "negative held error": rational("held", Fraction(-1), 0),
-    "other weight": rational("weights", Fraction(3, 2), 1),
-    "negative weight": rational("weights", Fraction(-1), 1),
-    "larger nu": rational("young", Fraction(12, 10), 1),
-    "negative nu": rational("young", Fraction(-1), 0),
-    "leak from nowhere": set_at("certificate", "leak", 1, value="1000"),
+    "smaller reach": in_cell("reach", Fraction(99, 100), 0),
+    "smaller inner reach": in_cell("reach", Fraction(99, 100), 1),
+    "negative reach": in_cell("reach", Fraction(-1), 2),
+    "start inside the reach": in_cell("start", Fraction(1, 2), 1),
+    "start too small": in_cell("start", Fraction(99, 100), 2),
+    "shape too small": in_cell("shape", Fraction(1, 2), 1),
+    "shape of zero": in_cell("shape", Fraction(0), 0),
+    "negative shape": in_cell("shape", Fraction(-1), 0),
+    "other coordinates": in_cell("transform", Fraction(11, 10), 1, 1),
+    "coordinates of another sign": in_cell("transform", Fraction(-1), 1, 0),
+    "singular coordinates": set_at("certificate", "cells", 0, "transform", 1, value=["0", "0", "0"]),
+    "tracking error left out of the coordinates": set_at("certificate", "cells", 0, "transform", 0, value=["0", "1", "0"]),
+    "huge coordinates": in_cell("transform", Fraction(10) ** 60, 2, 1),
+    "fewer cells": lambda data: data["certificate"]["cells"].pop(),
+    "cells in another order": lambda data: data["certificate"]["cells"].reverse(),
+    "no cells": set_at("certificate", "cells", value=[]),
+    "no split": set_at("certificate", "split", value=[]),
+    "split into nothing": set_at("certificate", "split", value=[0, 0, 0]),
+    "another split": set_at("certificate", "split", value=[2, 2, 1]),
+    "a box that hardly moves": rational("radii", Fraction(1, 10**40), 2),
     "smaller ball": ball(Fraction(95, 100)),
     "sign in the plant": operation("plant", "sub", "add"),
     "product made a sum": operation("plant", "mul", "add"),
@@ -278,7 +305,7 @@ MUTATIONS = {
     "limit of nothing": set_at("study", "plant", "limits", 0, "signals", value=[]),
     "no limits": set_at("study", "plant", "limits", value=[]),
     "shorter stroke": set_at("study", "plant", "stroke_m", value=[0.0, 0.39]),
-    "tighter requirement": set_at("study", "requirements", "tracking_error_m", value=0.001),
+    "tighter requirement": set_at("study", "requirements", "tracking_error_m", value=0.00018),
     "requirement of zero": set_at("study", "requirements", "tracking_error_m", value=0.0),
     "larger initial error": set_at("study", "uncertainty", "initial", "position", value=0.05),
     "reference that jumps": set_at("reference", "segments", 1, "coefficients", 0, value=0.2),
@@ -293,8 +320,27 @@ MUTATIONS = {
     "another kind of certificate": set_at("certificate", "kind", value="trust-me"),
     "another schema": set_at("schema", value="hdmm-opt/gains/2"),
     "a nominal value": set_at("controller", "nominal", "transmission", value=1.0),
-    **{f"without {name}": drop_obligation(name) for name in checker.REQUIRED["rac"]},
+    **{f"without {name}": drop_obligation(name) for name in checker.REQUIRED["rac"]["sampled"]},
 }  # fmt: skip
+#: The same for a composition.
+COMPOSED = {
+    "smaller outer gain": gain("beta_1", 0.9),
+    "larger inner gain": gain("beta_2", 1.1),
+    "wider inertia": both("motor_inertia", 1.5),
+    "faster decay": rational("decay", Fraction(11, 10)),
+    "smaller box": rational("radii", Fraction(9, 10), 0),
+    "smaller held error": rational("held", Fraction(9, 10), 0),
+    "negative held error": rational("held", Fraction(-1), 0),
+    "other weight": rational("weights", Fraction(3, 2), 1),
+    "negative weight": rational("weights", Fraction(-1), 1),
+    "larger nu": rational("young", Fraction(12, 10), 1),
+    "negative nu": rational("young", Fraction(-1), 0),
+    "leak from nowhere": set_at("certificate", "leak", 1, value="1000"),
+    "smaller ball": ball(Fraction(95, 100)),
+    "slower rate": rate(0.8),
+    "called sampled": set_at("certificate", "kind", value="sampled"),
+    **{f"without {name}": drop_obligation(name) for name in checker.REQUIRED["rac"]["composition"]},
+}
 #: Mutations that leave a true statement: the model-free law reads no nominal values, and its bounds are symmetric.
 HARMLESS = {"a nominal value", "load from the other side"}
 
@@ -310,8 +356,14 @@ def test_a_resealed_mutation_is_refused(name, document, resealed):
         assert "\n" not in report.message
 
 
-def test_resealing_without_a_change_keeps_the_verdict(document, resealed):
-    assert status(resealed(document)) == 0
+@pytest.mark.parametrize("name", COMPOSED)
+def test_a_resealed_mutation_of_a_composition_is_refused(name, composed, resealed):
+    COMPOSED[name](composed)
+    assert checker.check_text(resealed(composed)).status in (1, 2)
+
+
+def test_resealing_without_a_change_keeps_the_verdict(document, composed, resealed):
+    assert status(resealed(document)) == status(resealed(composed)) == 0
 
 
 def test_provenance_is_outside_the_hash(document):
@@ -375,8 +427,9 @@ def test_theta_in_v_is_refused_where_the_gain_may_change_sign():
         )  # fmt: skip
         found = certify(model, bounds, gains, np.array([1.0]))
         assert isinstance(found, Composition)
-        forged = replace(claim_of(model, bounds, gains, found), leak=[Fraction(1, 10**9)])
-        return verdict(claim_of(model, bounds, gains, found)), verdict(forged)
+        honest = claim_of(model, bounds, gains, found)
+        forged = replace(honest, vectors={**honest.vectors, "leak": [Fraction(1, 10**9)]})
+        return verdict(honest), verdict(forged)
 
     assert verdict_with(0.1) == (True, True)
     assert verdict_with(-0.1) == (True, False)

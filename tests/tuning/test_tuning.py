@@ -90,8 +90,10 @@ def test_selection_lowers_gains_to_what_the_bound_needs():
         return 0.0 if isinstance(found, Composition) and found.ball[0] <= 2e-3 else 1.0
 
     generous = (Gains(beta=40.0), Gains(beta=300.0))
-    chosen = select(certificate, violation, [generous], [(1.0, 100.0), (10.0, 1000.0)], 2e-3)
+    chosen = select(certificate, certificate, violation, [generous], [(1.0, 100.0), (10.0, 1000.0)], 2e-3)
     assert violation(chosen.certificate) == 0.0
     assert chosen.rounds > 0
-    hopeless = select(certificate, violation, [(Gains(beta=100.0), Gains(beta=90.0))], [(1.0, 100.0)] * 2, 2e-3)
+    hopeless = select(
+        certificate, certificate, violation, [(Gains(beta=100.0), Gains(beta=90.0))], [(1.0, 100.0)] * 2, 2e-3
+    )
     assert violation(hopeless.certificate) == 1.0
