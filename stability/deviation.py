@@ -22,6 +22,9 @@ from .rows import Builder
 
 Array = NDArray[np.float64]
 
+#: Gains may be rounded to float32 on their way into a machine; the bounds cover twice that.
+ROUNDED = Interval(1 - 2.0**-22, 1 + 2.0**-22)
+
 
 @dataclass(frozen=True, kw_only=True)
 class DeviationRows:
@@ -136,11 +139,11 @@ class _Builder(Builder):
 
     def _feedback(self, row: int) -> list[Interval]:
         """K for one input: b_i Q_i with Q_i = z_i + b_t Q_t."""
-        factor, column = self.half_gain[row], [Interval(0.0)] * len(self.model.rows)
+        factor, column = self.half_gain[row] * ROUNDED, [Interval(0.0)] * len(self.model.rows)
         column[row] = factor
         target = self.model.rows[row].target
         while isinstance(target, int):
-            factor = factor * self.half_gain[target]
+            factor = factor * self.half_gain[target] * ROUNDED
             column[target] = factor
             target = self.model.rows[target].target
         return column

@@ -25,12 +25,14 @@ class Map:
     """|y(t + T)| <= A_v |y| + b_v at every vertex, and what happens in between.
 
     Attributes:
+        nominal: The nominal closed map in y, with its signs. Shape (n, n).
         vertices: Pairs (A_v, b_v). Shapes (n, n), (n,).
         inverse: W^-1. Shape (n, n).
         control: Bounds |v| <= control |y|. Shape (m, n).
         motion: Bounds |z(t) - z(t_k)| <= motion[0] |y| + motion[1] within a period. Shapes (n, n), (n,).
     """
 
+    nominal: Array
     vertices: list[tuple[Array, Array]]
     inverse: Array
     control: Array
@@ -157,7 +159,7 @@ def comparison(rows: DeviationRows, period: float, transform: Array) -> Map:
         signed = base + sum((change[i] * effects[i] for i in uncertain), np.zeros_like(base))
         moving = np.abs(signed) + sum((1 + change[i]) * shares[i][0] for i in range(n))
         vertices.append((moving, noise + sum((1 + change[i]) * shares[i][1] for i in range(n))))
-    return Map(vertices=vertices, inverse=inverse, control=control, motion=fold(rest.motion()))
+    return Map(nominal=base, vertices=vertices, inverse=inverse, control=control, motion=fold(rest.motion()))
 
 
 def _inertia_effect(a: Array, i: int, period: float) -> Array:
