@@ -31,6 +31,8 @@ def run_design(
     """`hdmm-opt design`."""
     chosen = study.load(name)
     target = Path(f"{chosen.study.name}.gains.json") if output is None else output
+    if target.suffix != ".json":
+        raise InvalidInputError(f"a gain file is named .json: got {target}; give -o another name")
     check_writable(target)
     rejected = target.with_name(target.name.removesuffix(".json").removesuffix(".gains") + ".rejected.json")
     state = target.with_name(f".{target.name}.state")
@@ -43,6 +45,8 @@ def run_design(
     if result.document is None:
         write_text(rejected, gain_file.to_text(pipeline.rejected_document(chosen, result)))
         _explain(chosen.study.name, result, rejected)
+        if target.exists():
+            click.echo(f"  {target} is from an earlier run, not of this design; it was left as it is", err=True)
         return NOT_PROVED
     write_text(target, gain_file.to_text(result.document))
     rejected.unlink(missing_ok=True)
@@ -84,6 +88,8 @@ def _summary(result: pipeline.Design) -> None:
     click.echo(report.message, err=True)
     for o in report.obligations:
         click.echo(f"  {o.verdict:8} {o.name:12} margin {o.margin:.4g} {o.unit}: {o.statement}", err=True)
+    for note in result.notes:
+        click.echo(note, err=True)
     shown = document["validation"]
     certified = float(Fraction(document["certificate"]["envelope"]["ball"][0]))
     late, ratio = shown["largest_error_after_transient_m"], shown["bound_over_simulated"]
@@ -94,6 +100,10 @@ def _summary(result: pipeline.Design) -> None:
     )
     for row in shown["requirements"]:
         click.echo(f"  {row['name']}: required {row['required']:g}, simulated {row['simulated']:.4g}", err=True)
+    for entry in document["assumptions"]:
+        if entry["name"].startswith("disturbance."):
+            name = entry["name"].partition(".")[2]
+            click.echo(f"for {name} from {entry['lower']:g} to {entry['upper']:g} {entry['unit']}", err=True)
     assumed = [k for k, p in document["study"]["plant"]["parameters"].items() if p["source"] == "assumed"]
     click.echo(f"assumed parameters, to be replaced by yours: {', '.join(assumed)}", err=True)
 

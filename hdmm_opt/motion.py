@@ -46,6 +46,12 @@ def build_reference(study: Study, plant: Plant) -> Reference:
         InvalidInputError: a move breaks a limit; the message names it and what would do.
     """
     section = study.reference
+    room = min(min(section.waypoints_m) - plant.stroke[0], plant.stroke[1] - max(section.waypoints_m))
+    if not room > 0:
+        raise InvalidInputError(
+            f"reference: waypoints lie inside the stroke, {plant.stroke[0]:g} to {plant.stroke[1]:g} m, with room for "
+            f"the tracking error: got {min(section.waypoints_m):g} to {max(section.waypoints_m):g} m; move them inwards"
+        )
     segments: list[Spline] = []
     clock = 0.0
     for k, (start, goal) in enumerate(zip(section.waypoints_m, section.waypoints_m[1:], strict=False)):

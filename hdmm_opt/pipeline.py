@@ -15,7 +15,7 @@ from stability import Failure, Gains, checker
 from . import gain_file, validation
 from .errors import DefectError
 from .problem import KINDS, Problem, assemble
-from .proof import Verdict, certificate, diagnose, violation
+from .proof import Verdict, certificate, compared, diagnose, longest_period, violation
 from .selection import Options, Progress, search, starting_point
 from .study import Study
 
@@ -33,6 +33,7 @@ class Design:
         verdicts: What failed, the cause first; empty for a proved design that meets its requirements.
         missed: Requirements that a simulation missed.
         gains: The gains.
+        notes: Which certificate was taken, and the longest control period at which the gains are proved.
     """
 
     document: dict[str, Any] | None
@@ -40,6 +41,7 @@ class Design:
     verdicts: tuple[Verdict, ...]
     missed: tuple[str, ...]
     gains: tuple[Gains, ...]
+    notes: tuple[str, ...] = ()
 
 
 def design(study: Study, options: Options, progress: Progress) -> Design:
@@ -88,8 +90,14 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
     verdicts = tuple(_from_checker(report))
     accepted = report.status == 0 and not shown.missed
     return Design(
-        document=finished if accepted else None, report=report, verdicts=verdicts, missed=shown.missed, gains=gains
-    )
+        document=finished if accepted else None, report=report, verdicts=verdicts, missed=shown.missed, gains=gains,
+        notes=(compared(problem, gains, found), _rates(problem, gains)) if accepted else (),
+    )  # fmt: skip
+
+
+def _rates(problem: Problem, gains: tuple[Gains, ...]) -> str:
+    longest = longest_period(problem, gains)
+    return f"certified up to a control period of {longest * 1e3:.4g} ms ({1 / longest:.4g} Hz), not found beyond"
 
 
 def _budget(study: Study, options: Options) -> tuple[int, int, int]:
@@ -108,7 +116,7 @@ def _from_checker(report: checker.Report) -> list[Verdict]:
     failed = [
         Verdict(
             name=o.name, statement=o.statement, margin=o.margin, unit=o.unit, verdict=o.verdict,
-            remedy="the search accepted these gains with too little room; widen the gain ranges or the limits",
+            remedy=o.remedy,
         )
         for o in report.obligations
         if o.verdict != "proved"

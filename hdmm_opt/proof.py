@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from stability import Certificate, Failure, Gains, certify, certify_sampled
+from stability import Bounds, Certificate, Composition, Failure, Gains, certify, certify_sampled
 
 from .control import RAC
 from .problem import Problem
@@ -60,14 +60,35 @@ def certificate(
     sampled = certify_sampled(problem.model, bounds, gains, problem.box)
     if isinstance(sampled, Certificate) and not thorough:
         return sampled
-    found = [sampled, certify(problem.model, bounds, gains, problem.box)]
+    found: list[Certificate | Failure] = [sampled, composition(problem, bounds, gains)]
     if isinstance(sampled, Certificate):
         found.append(certify_sampled(problem.model, bounds, gains, problem.box, refine=True))
-    if any(g.epsilon > 0 for g in gains):
-        found.append(certify(problem.model, bounds, gains, problem.box, adaptive=True))
-    return min(
-        found, key=lambda c: (violation(problem, c, gains), math.inf if isinstance(c, Failure) else float(c.ball[0]))
-    )
+    return min(found, key=lambda c: _rank(problem, c, gains))
+
+
+def composition(problem: Problem, bounds: Bounds, gains: tuple[Gains, ...]) -> Composition | Failure:
+    """The better composition certificate of those without and with θ̂ in V."""
+    plain = certify(problem.model, bounds, gains, problem.box)
+    if not any(g.epsilon > 0 for g in gains):
+        return plain
+    adaptive = certify(problem.model, bounds, gains, problem.box, adaptive=True)
+    return min((plain, adaptive), key=lambda c: _rank(problem, c, gains))
+
+
+def _rank(problem: Problem, found: Certificate | Failure, gains: tuple[Gains, ...]) -> tuple[float, float]:
+    return (violation(problem, found, gains), math.inf if isinstance(found, Failure) else float(found.ball[0]))
+
+
+def compared(problem: Problem, gains: tuple[Gains, ...], found: Certificate) -> str:
+    """Which certificate was taken, and what the other kind would have given."""
+    other: Certificate | Failure
+    if isinstance(found, Composition):
+        name, label = "composition", "sampled"
+        other = certify_sampled(problem.model, problem.bounds, gains, problem.box)
+    else:
+        name, label, other = "sampled", "composition", composition(problem, problem.bounds, gains)
+    told = other.reason if isinstance(other, Failure) else f"{1e3 * float(other.ball[0]):.4g} mm"
+    return f"{name} certificate, {1e3 * float(found.ball[0]):.4g} mm ({label}: {told})"
 
 
 def slacks(problem: Problem, found: Certificate) -> list[tuple[str, float, float, str]]:

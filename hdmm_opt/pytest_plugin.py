@@ -23,10 +23,12 @@ class GainFile(pytest.File):
         """The file as a whole, then its obligations."""
         from stability import checker
 
+        from .verdicts import describe
+
         report = checker.check_file(self.path)
         yield Verdict.from_parent(self, name="gain file", proved=report.status == 0, text=report.message)
         for o in report.obligations:
-            text = f"{o.verdict}: {o.name}, margin {o.margin:.4g} {o.unit}: {o.statement}"
+            text = f"{o.verdict}: {o.name}, {describe(o)}"
             yield Verdict.from_parent(self, name=o.name, proved=o.verdict == "proved", text=text)
 
 

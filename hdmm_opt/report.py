@@ -37,6 +37,16 @@ corners and draws: {{ "%.4g"|format(late) }} mm.</p>
 <td>{{ p.unit }}<td class="n">&plusmn;{{ "%.3g"|format(100 * p.tolerance) }} %<td>{{ p.source }}<td>{{ p.meaning }}</tr>
 {% endfor %}</table>
 <p>Tolerances are assumed wherever the source gives none.</p>
+<h2>What else is assumed</h2>
+<table><tr><th>quantity<th class="n">from<th class="n">to<th>unit<th>source</tr>
+{% for a in assumptions %}<tr><td>{{ a.name }}<td class="n">{{ "%.6g"|format(a.lower) }}
+<td class="n">{{ "%.6g"|format(a.upper) }}<td>{{ a.unit }}<td>{{ a.source }}</tr>{% endfor %}
+{% for x in limits %}<tr><td>limit on {{ x.name }}<td class="n">0<td class="n">{{ "%.6g"|format(x.value) }}
+<td>{{ x.unit }}<td>{{ x.source }}</tr>{% endfor %}
+<tr><td>stroke<td class="n">{{ stroke[0] }}<td class="n">{{ stroke[1] }}<td>m<td>study</tr>
+<tr><td>control rate<td class="n">{{ rate }}<td class="n">{{ rate }}<td>Hz<td>study</tr></table>
+<p>A positive load pushes the rod back in; noise bounds hold at every sample; initial errors are those of the
+subsystems at the start. The statement and its proof have the hash {{ sha }}.</p>
 <h2>Obligations</h2>
 <table><tr><th>obligation<th>verdict<th class="n">margin<th>unit<th>statement</tr>
 {% for o in obligations %}<tr><td>{{ o.name }}<td class="{{ o.verdict }}">{{ o.verdict }}
@@ -81,6 +91,10 @@ def write_report(document: dict[str, Any], folder: Path) -> Path:
         bound=1e3 * float(Fraction(document["certificate"]["envelope"]["ball"][0])),
         late=1e3 * document["validation"]["largest_error_after_transient_m"],
         rate=f"{document['controller']['rate_hz']:g}",
+        assumptions=[a for a in document["assumptions"] if not a["name"].startswith("parameter.")],
+        limits=study["plant"]["limits"],
+        stroke=study["plant"]["stroke_m"],
+        sha=document["sha256"],
         plots=_markup(figure(document)),
         parameters=sorted(parameters, key=lambda p: order.index(p["source"])),
         obligations=document["obligations"],

@@ -7,7 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from stability import checker
-from stability.checker import Report
+from stability.checker import Obligation, Report
 
 from .files import check_writable, write_text
 
@@ -23,6 +23,12 @@ def run_check(files: Sequence[Path], as_json: bool, junit: Path | None) -> int:
     return max(report.status for report in reports)
 
 
+def describe(o: Obligation) -> str:
+    """Margin, statement and, where it fails, what would pass."""
+    text = f"margin {o.margin:.4g} {o.unit}: {o.statement}"
+    return f"{text}; would pass: {o.remedy}" if o.remedy else text
+
+
 def to_xml(reports: Sequence[Report]) -> str:
     """One suite a file, one case an obligation, and one for the file as a whole.
 
@@ -36,7 +42,7 @@ def to_xml(reports: Sequence[Report]) -> str:
     for report in reports:
         cases = [("gain file", report.status == 0, report.message)]
         for o in report.obligations:
-            cases.append((o.name, o.verdict == "proved", f"margin {o.margin:.4g} {o.unit}: {o.statement}"))
+            cases.append((o.name, o.verdict == "proved", describe(o)))
         bad = sum(not good for _, good, _ in cases)
         unreadable = report.status == 2
         counts = {

@@ -1201,6 +1201,7 @@ class Obligation:
     margin: float
     unit: str
     verdict: str
+    remedy: str = ""
 
 
 def positive_definite(matrix: list[list[Fraction]]) -> bool:
@@ -1444,50 +1445,40 @@ def obligations(claim: Claim) -> list[Obligation]:
     """Decide every obligation of the law."""
     made: list[Obligation] = []
 
-    def state(name: str, statement: str, margin: Fraction, unit: str, strict: bool = True) -> None:
+    def state(name: str, statement: str, margin: Fraction, unit: str, remedy: str, strict: bool = True) -> None:
         good = margin > 0 or (margin == 0 and not strict)
         size = Fraction(10) ** 300
         shown = float(max(-size, min(size, margin)))
-        made.append(Obligation(name, statement, shown, unit, "proved" if good else "undecided"))
+        made.append(Obligation(name, statement, shown, unit, "proved" if good else "undecided", "" if good else remedy))
 
-    state("non-vacuity", "the box is not empty, holds the initial errors, and no limit is zero", vacuity(claim), "1")
+    anew = "a certificate made for these gains and assumptions: run design again"
+    statement = "the box is not empty, holds the initial errors, and no limit is zero"
+    state("non-vacuity", statement, vacuity(claim), "1", "positive limits, and a box larger than the initial errors")
     if made[0].verdict != "proved":
         raise NotProvedError("the certificate is about an empty set (obligation non-vacuity)")
     loop, verdict = judge(claim, ROUNDING)
     span = claim.reference[0]
     inside = min(span[0] - claim.stroke[0], claim.stroke[1] - span[1])
-    state(
-        "reference",
-        "the reference is continuous to its acceleration, ends at rest and stays inside the stroke",
-        inside,
-        "m",
-    )
+    statement = "the reference is continuous to its acceleration, ends at rest and stays inside the stroke"
+    state("reference", statement, inside, "m", f"waypoints {float(-inside):.3g} m further inside the stroke")
     name, statement, spare = verdict.contraction()
-    state(name, statement, spare, "1/s", False)
-    state("invariance", "no trajectory from the initial set leaves the assumed box", verdict.invariance(), "1")
+    state(name, statement, spare, "1/s", anew, False)
+    state("invariance", "no trajectory from the initial set leaves the assumed box", verdict.invariance(), "1", anew)
     slack, unit, which = min(authority(claim, loop), key=lambda entry: entry[0] / scale(claim, entry[2]))
-    state("authority", f"every limit holds over the certified set; the tightest is {which}", slack, unit)
+    statement = f"every limit holds over the certified set; the tightest is {which}"
+    state("authority", statement, slack, unit, f"a limit on {which} that is {float(-slack) * 1.001:.4g} {unit} wider")
     statement, spare = verdict.sampling()
-    state("sampling", f"{statement} at {float(1 / claim.period):g} Hz", spare, "1")
-    state(
-        "adaptation",
-        "sampled adaptation keeps theta >= 0, and delta sigma >= mu where theta is in V",
-        adaptation(claim, loop),
-        "1",
-        False,
-    )
+    state("sampling", f"{statement} at {float(1 / claim.period):g} Hz", spare, "1", f"a faster rate, or {anew}")
+    statement = "sampled adaptation keeps theta >= 0, and delta sigma >= mu where theta is in V"
+    faster = max(float(g.delta[1] * g.sigma[1]) for g in loop.gain.values())
+    state("adaptation", statement, adaptation(claim, loop), "1", f"a rate of at least {faster:.4g} Hz", False)
     steps = [step for step in (Fraction(1, 1000), Fraction(1, 10000), ROUNDING) if holds(claim, step)]
-    state(
-        "rounding", "everything holds for the gains as decimal, float64 and float32", (steps or [Fraction(-1)])[0], "1"
-    )
+    statement = "everything holds for the gains as decimal, float64 and float32"
+    state("rounding", statement, (steps or [Fraction(-1)])[0], "1", "what the other obligations need")
     error = verdict.ball(0)
-    state(
-        "accuracy",
-        f"from {float(claim.transient):g} s on the tracking error is at most {float(error) * 1e3:.4g} mm",
-        claim.accuracy - error,
-        "m",
-        False,
-    )
+    statement = f"from {float(claim.transient):g} s on the tracking error is at most {float(error) * 1e3:.4g} mm"
+    needed = f"a requirement of {float(error) * 1.0001e3:.4g} mm"
+    state("accuracy", statement, claim.accuracy - error, "m", needed, False)
     for i, stated in enumerate(claim.ball):
         if stated < verdict.ball(i):
             raise NotProvedError(f"the envelope states a smaller bound on row {i + 1} than can be proved")
@@ -1631,6 +1622,8 @@ def show(reports: list[Report], *, as_json: bool) -> None:
             print(f"{report.file}: {report.message}")
             for o in report.obligations:
                 print(f"  {o.verdict:9} {o.name:12} margin {o.margin:.4g} {o.unit}: {o.statement}")
+                if o.remedy:
+                    print(f"            would pass: {o.remedy}")
 
 
 if __name__ == "__main__":

@@ -208,6 +208,13 @@ def without_load(data):
     entry[:] = ["const", "0.0"]
 
 
+def stuck(data):
+    """An actuator whose effectiveness may be zero."""
+    data["study"]["plant"]["parameters"]["torque_scale"]["tolerance"] = 1.0
+    entry = next(a for a in data["assumptions"] if a["name"] == "parameter.torque_scale")
+    entry["lower"], entry["upper"] = 0.0, 2.0
+
+
 def upside_down(data):
     data["study"]["plant"]["parameters"]["load_mass"]["tolerance"] = -0.9
 
@@ -224,6 +231,7 @@ MUTATIONS = {
     "disturbance named as a constant": known_load,
     "plant without its load": without_load,
     "negative tolerance": upside_down,
+    "stuck actuator": stuck,
     "load upside down": in_study("uncertainty", "disturbances", "load_force", value=[76e3, 65e3]),
     "one-sided noise": set_at("assumptions", -6, "lower", value=-0.05),
     "one-sided start": set_at("assumptions", -3, "lower", value=-5.0),
@@ -360,6 +368,23 @@ def test_a_resealed_mutation_is_refused(name, document, resealed):
 def test_a_resealed_mutation_of_a_composition_is_refused(name, composed, resealed):
     COMPOSED[name](composed)
     assert checker.check_text(resealed(composed)).status in (1, 2)
+
+
+@pytest.mark.parametrize(("name", "path", "value"), [
+    ("authority", ("study", "plant", "limits", 0, "value"), 45.0),
+    ("accuracy", ("study", "requirements", "tracking_error_m"), 1e-4),
+])  # fmt: skip
+def test_what_would_pass_passes(name, path, value, document, resealed):
+    """The smallest change that a failing verdict names is enough, and hardly more."""
+    put(document, path, value)
+    failing = [o for o in checker.check_text(resealed(document)).obligations if o.verdict != "proved"]
+    told = next(o for o in failing if o.name == name)
+    amount = float(next(word for word in told.remedy.split() if word[0].isdigit()))
+    enough = value + amount if name == "authority" else amount / 1e3
+    put(document, path, enough)
+    assert status(resealed(document)) == 0
+    put(document, path, value + 0.9 * (enough - value))
+    assert status(resealed(document)) == 1
 
 
 def test_resealing_without_a_change_keeps_the_verdict(document, composed, resealed):

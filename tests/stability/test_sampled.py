@@ -137,3 +137,10 @@ def test_cells_and_coordinates_only_help():
 
 def test_a_continuous_law_is_no_business_of_this_certificate():
     assert isinstance(certify_sampled_chain((15.0, 100.0)), Failure)
+
+
+def test_a_stuck_actuator_is_never_proved():
+    """An effectiveness that may be zero leaves no gain to prove anything with; one of a tenth is another matter."""
+    for spread in (1.0, 1.5):
+        assert isinstance(certify_sampled_chain((15.0, 100.0), period=1e-3, spread=spread), Failure)
+    assert isinstance(certify_sampled_chain((1.0, 50.0), period=1e-3, spread=0.5), Sampled)
