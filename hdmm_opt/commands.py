@@ -189,6 +189,10 @@ def run_falsify(path: Path, budget: int, seed: int) -> int:
     radius = float(Fraction(document["certificate"]["radii"][0]))
     ball = float(Fraction(document["certificate"]["envelope"]["ball"][0]))
     late = found.metrics.maximum_error_m
+    if not found.largest_use < 1 - 1e-9:
+        raise DefectError(
+            f"a run used {found.largest_use:.6g} of a limit that is proved; please report this file with seed {seed}"
+        )
     if not (found.largest_error <= radius and late <= ball):
         text = json.dumps(asdict(found.scenario))
         raise DefectError(f"a run reached {late:.6g} m, certified {ball:.6g} m; please report this scenario: {text}")
@@ -200,7 +204,7 @@ def run_falsify(path: Path, budget: int, seed: int) -> int:
     worst = finished["validation"]["largest_error_after_transient_m"]
     click.echo(
         f"worst {1e3 * late:.4g} mm, worst on record {1e3 * worst:.4g} mm, certified {1e3 * ball:.4g} mm: "
-        f"ratio {ball / worst:.3g}"
+        f"ratio {ball / worst:.3g}; at most {100 * found.largest_use:.3g} % of a limit used"
     )
     return PROVED
 

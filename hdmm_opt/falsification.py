@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from stability import Gains
 
 from .problem import Problem
-from .simulation import Metrics, Scenario
+from .simulation import Metrics, Scenario, Trace
 from .validation import figures
 
 Array = NDArray[np.float64]
@@ -41,12 +41,14 @@ class Witness:
         scenario: Replays the run.
         metrics: Its figures.
         largest_error: Largest |tracking error| at any time of any run of the search, m.
+        largest_use: Largest share of a limit that any run used; 1 where an input saturated.
         runs: Number of simulated runs.
     """
 
     scenario: Scenario
     metrics: Metrics
     largest_error: float
+    largest_use: float
     runs: int
 
 
@@ -76,7 +78,10 @@ def falsify(
     attack.structured()
     attack.evolve()
     assert attack.worst is not None
-    return Witness(scenario=attack.worst[0], metrics=attack.worst[1], largest_error=attack.largest, runs=attack.runs)
+    return Witness(
+        scenario=attack.worst[0], metrics=attack.worst[1], largest_error=attack.largest, largest_use=attack.use,
+        runs=attack.runs,
+    )  # fmt: skip
 
 
 class _Attack:
@@ -89,7 +94,7 @@ class _Attack:
         self.names = [name for name, p in problem.plant.parameters.items() if p.tolerance > 0]
         self.low, self.high = problem.study.uncertainty.load_force_n
         self.end = problem.reference.duration
-        self.runs, self.largest = 0, 0.0
+        self.runs, self.largest, self.use = 0, 0.0, 0.0
         self.worst: tuple[Scenario, Metrics] | None = None
 
     def error(self, scenario: Scenario) -> float:
@@ -98,6 +103,7 @@ class _Attack:
         metrics = figures(self.problem, trace)
         self.runs += 1
         self.largest = max(self.largest, np.inf if trace.diverged else float(np.abs(trace.error).max()))
+        self.use = max(self.use, limit_use(self.problem, trace))
         if self.worst is None or metrics.maximum_error_m > self.worst[1].maximum_error_m:
             self.worst = (scenario, metrics)
         self.progress(self.runs / self.budget, f"worst {1e3 * self.worst[1].maximum_error_m:.4g} mm")
@@ -166,6 +172,14 @@ class _Attack:
             initial=float(pushed[k]),
             seed=self.seed,
         )
+
+
+def limit_use(problem: Problem, trace: Trace) -> float:
+    """The largest share of a limit that a run uses."""
+    plant = problem.plant
+    signals = dict(zip((*plant.states, *plant.inputs), (*trace.x, *trace.u), strict=True))
+    sizes = (np.linalg.norm([signals[s] for s in limit.signals], axis=0).max() / limit.value for limit in plant.limits)
+    return float(max(sizes))
 
 
 def _switched(first: float, second: float, times: tuple[float, ...]) -> tuple[tuple[float, float], ...]:

@@ -110,12 +110,13 @@ def certify_sampled(
 
 @dataclass(frozen=True)
 class _Bounds:
-    """What one cell needs of the box, and certifies."""
+    """What one cell reaches, and needs of the box."""
 
-    cell: Cell
+    transform: Array
+    reach: Array
+    start: Array
     rows: DeviationRows
     image: Map
-    decay: float
     needed: Array
     inputs: Array
 
@@ -148,12 +149,19 @@ class _Search:
             needed = np.max([entry.needed for entry in solved], axis=0)
             inputs = np.max([entry.inputs for entry in solved], axis=0)
             if (needed * ROOM <= radii).all() and (inputs * ROOM <= held).all():
-                decay = min(entry.decay for entry in solved)
-                ball = np.max([self._ball(entry, decay, radii, held) for entry in solved], axis=0)
+                ways = [self._approach(entry.image, entry.reach, entry.start) for entry in solved]
+                decay = min(rate for _, rate in ways)
+                cells = tuple(
+                    Cell(transform=entry.transform, reach=entry.reach, start=entry.start, shape=shape)
+                    for entry, (shape, _) in zip(solved, ways, strict=True)
+                )
+                ball = np.max(
+                    [self._ball(*pair, decay, radii, held) for pair in zip(solved, cells, strict=True)], axis=0
+                )
                 return Sampled(
                     decay=decay, radii=radii, held=held, ball=np.minimum(ball, radii),
                     effort=rows.feedforward + held, states=rows.states, split=split,
-                    cells=tuple(entry.cell for entry in solved),
+                    cells=cells,
                 )  # fmt: skip
             if (needed > self.limit).any():
                 worst = int(np.argmax(needed / self.limit))
@@ -172,20 +180,20 @@ class _Search:
         if start is None:
             return Failure(reason="the initial errors lead out of every contracting set", row=n - 1)
         start = np.maximum(start, reach)
-        shape, decay = self._approach(image, reach, start)
         return _Bounds(
-            cell=Cell(transform=transform, reach=reach, start=start, shape=shape),
+            transform=transform,
+            reach=reach,
+            start=start,
             rows=rows,
             image=image,
-            decay=decay,
             needed=self._between(rows, image, start, radii, held),
             inputs=image.control @ start,
         )
 
-    def _ball(self, found: _Bounds, decay: float, radii: Array, held: Array) -> Array:
+    def _ball(self, found: _Bounds, cell: Cell, decay: float, radii: Array, held: Array) -> Array:
         """Bounds on |z| after the transient."""
         left = math.exp(-decay * max(0.0, self.bounds.transient - self.period))
-        late = np.minimum(found.cell.reach + found.cell.shape * left, found.cell.start)
+        late = np.minimum(cell.reach + cell.shape * left, cell.start)
         return self._between(found.rows, found.image, late, radii, held)
 
     def _approach(self, image: Map, reach: Array, start: Array) -> tuple[Array, float]:
@@ -290,7 +298,7 @@ def least_reach(vertices: list[tuple[Array, Array]]) -> Array | None:
         if not radius < 1:
             return None
         found = np.asarray(np.linalg.solve(np.eye(n) - a, b + extra), dtype=np.float64)
-        if np.allclose(found, reach, rtol=1e-9, atol=0.0):
+        if (np.abs(found - reach) <= 1e-9 * np.abs(found)).all():
             if extra.any():
                 return found if (found > 0).all() else None
             extra = SPARE * (1 - radius) * np.maximum(found, 1e-12 * found.max())
