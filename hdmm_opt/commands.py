@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from dataclasses import asdict, replace
 from fractions import Fraction
 from pathlib import Path
@@ -73,10 +74,11 @@ def _explain(name: str, result: pipeline.Design, left: Path) -> None:
     what = "proved, but a requirement is missed" if proved else "not proved"
     click.echo(f"{name}: {what}; no gain file written", err=True)
     for verdict in result.verdicts:
-        click.echo(f"  {verdict.verdict}: {verdict.name} (margin {verdict.margin:.4g} {verdict.unit})", err=True)
+        margin = f"{verdict.margin:.4g} {verdict.unit}" if math.isfinite(verdict.margin) else "unknown"
+        click.echo(f"  {verdict.verdict}: {verdict.name} (margin {margin})", err=True)
         click.echo(f"    {verdict.statement}", err=True)
         if verdict.remedy:
-            click.echo(f"    would pass: {verdict.remedy}", err=True)
+            click.echo(f"    {'would pass' if verdict.sure else 'would help'}: {verdict.remedy}", err=True)
     for line in result.missed[:5]:
         click.echo(f"  requirement missed: {line}", err=True)
     click.echo(f"  details: {left}", err=True)

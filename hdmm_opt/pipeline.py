@@ -116,7 +116,7 @@ def _from_checker(report: checker.Report) -> list[Verdict]:
     failed = [
         Verdict(
             name=o.name, statement=o.statement, margin=o.margin, unit=o.unit, verdict=o.verdict,
-            remedy=o.remedy,
+            remedy=o.remedy, sure=True,
         )
         for o in report.obligations
         if o.verdict != "proved"

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from stability import Bounds, Certificate, Composition, Failure, Gains, certify, certify_sampled
+from stability import Bounds, Certificate, Composition, Failure, Gains, Interval, certify, certify_sampled
 
 from .control import RAC
 from .problem import Problem
@@ -35,7 +35,8 @@ class Verdict:
         margin: Distance from failing, [unit]; negative where it fails.
         unit: Unit of the margin.
         verdict: "proved", "refuted" or "undecided".
-        remedy: What would make it pass; empty where it passes.
+        remedy: What would make it pass, or help; empty where it passes.
+        sure: True where the remedy was tried and makes it pass.
         witness: For a refuted obligation, the scenario and control rate that replay it.
     """
 
@@ -45,6 +46,7 @@ class Verdict:
     unit: str
     verdict: str
     remedy: str = ""
+    sure: bool = False
     witness: dict[str, Any] | None = None
 
 
@@ -57,6 +59,8 @@ def certificate(
     where `thorough` asks for both; the one with the smaller bound among those that meet the limits is returned.
     """
     bounds = problem.bounds if period is None else replace(problem.bounds, period=period)
+    if bounds.period == 0:
+        return composition(problem, bounds, gains)
     sampled = certify_sampled(problem.model, bounds, gains, problem.box)
     if isinstance(sampled, Certificate) and not thorough:
         return sampled
@@ -151,7 +155,58 @@ def diagnose(problem: Problem, gains: tuple[Gains, ...]) -> list[Verdict]:
     found = [*_authority(problem, gains, continuous), *_conditions(problem, continuous)]
     if not found:
         found = [*_sampling(problem, gains)]
-    return found
+    return [*found, *_uncertainty(problem, gains)]
+
+
+def provable_share(problem: Problem, gains: tuple[Gains, ...]) -> float:
+    """The largest share of every uncertainty at which the gains are proved, by bisection; 0 where none was found.
+
+    Parameters and loads keep the middle of their ranges; noise and initial errors shrink to zero.
+    """
+
+    def good(share: float) -> bool:
+        smaller = replace(problem, bounds=shrunk(problem.bounds, share))
+        return violation(smaller, certificate(smaller, gains), gains) == 0.0
+
+    if not good(0.0):
+        return 0.0
+    low, high = 0.0, 1.0
+    for _ in range(10):
+        middle = (low + high) / 2
+        low, high = (middle, high) if good(middle) else (low, middle)
+    return low
+
+
+def shrunk(bounds: Bounds, share: float) -> Bounds:
+    """The assumptions with every uncertainty at a share of its size."""
+
+    def smaller(interval: Interval) -> Interval:
+        middle = (interval.low + interval.high) / 2
+        return Interval(middle) + Interval.symmetric(share * (interval.high - interval.low) / 2)
+
+    return replace(
+        bounds,
+        parameters={name: smaller(value) for name, value in bounds.parameters.items()},
+        disturbances={name: smaller(value) for name, value in bounds.disturbances.items()},
+        noise=tuple(share * value for value in bounds.noise),
+        initial=tuple(share * value for value in bounds.initial),
+    )
+
+
+def _uncertainty(problem: Problem, gains: tuple[Gains, ...]) -> list[Verdict]:
+    share = provable_share(problem, gains)
+    what = "every tolerance, load range, noise bound and initial error"
+    if share == 0.0:
+        statement, remedy = "not proved for the nominal machine either", "other gains, or another modelling term"
+    else:
+        statement = f"proved with {what} at {100 * share:.3g} % of the study's"
+        remedy = f"{what} at {100 * share:.3g} %"
+    return [
+        Verdict(
+            name="uncertainty", statement=statement, margin=share - 1.0, unit="share", verdict="undecided",
+            remedy=remedy, sure=share > 0.0,
+        )
+    ]  # fmt: skip
 
 
 def _authority(problem: Problem, gains: tuple[Gains, ...], continuous: Certificate | Failure) -> list[Verdict]:
@@ -263,6 +318,6 @@ def _sampling(problem: Problem, gains: tuple[Gains, ...]) -> list[Verdict]:
         Verdict(
             name="sampling",
             statement=f"held inputs at {1 / period:g} Hz (period {period * 1e6:g} us): {detail}",
-            margin=(longest - period) * 1e6, unit="us", verdict="undecided", remedy=remedy,
+            margin=(longest - period) * 1e6, unit="us", verdict="undecided", remedy=remedy, sure=longest > 0.0,
         )
     ]  # fmt: skip

@@ -34,9 +34,10 @@ REQUIRED = {
     }
 }
 MAX_BYTES, MAX_DIGITS, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 20_000_000, 300, 2_000, 8, 5_000
-MAX_CELLS = 64
+#: Cells of a sampled certificate, digits of its numbers, and (vertices + 8) n³ summed over its cells.
+MAX_CELLS, MAX_CELL_DIGITS, MAX_VERTICES = 64, 60, 40_000
 #: Interval products that one check may take; a file of ours takes a few per cent of it.
-MAX_PRODUCTS = 1_000_000
+MAX_PRODUCTS = 300_000
 #: Relative width given to every gain, so that the proof holds for its decimal, its float64 and its float32.
 ROUNDING = Fraction(1, 2**23)
 BITS, MAX_SHIFT = 96, 3_000
@@ -450,7 +451,10 @@ def cell_of(entry: dict[str, Any], count: int) -> Cell:
     rows = entry["transform"]
     need(isinstance(rows, list) and len(rows) == count, f"a transform must have {count} rows")
     vectors = [numbers(entry[name], count, name) for name in VECTORS["sampled"]]
-    return Cell([numbers(row, count, "a transform") for row in rows], *vectors)
+    transform = [numbers(row, count, "a transform") for row in rows]
+    longest = max(len(str(v)) for row in (*transform, *vectors) for v in row)
+    need(longest <= MAX_CELL_DIGITS, f"a cell's numbers have at most {MAX_CELL_DIGITS} digits")
+    return Cell(transform, *vectors)
 
 
 def parse(text: str) -> dict[str, Any]:
@@ -625,10 +629,8 @@ def _read(data: dict[str, Any]) -> Claim:
     )
     split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]] if kind == "sampled" else []
     cells = [cell_of(entry, n) for entry in certificate["cells"]] if kind == "sampled" else []
-    need(
-        not split or (len(split) == n and len(cells) == math.prod(split) <= MAX_CELLS),
-        "the cells do not cover the inertias",
-    )
+    covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod(split)
+    need(kind != "sampled" or covered, "the cells do not cover the inertias")
     limits, stroke = study["plant"]["limits"], numbers(study["plant"]["stroke_m"], 2, "stroke_m")
     need(
         limits and all(limit["signals"] and set(limit["signals"]) <= {*states, *model["inputs"]} for limit in limits),
@@ -864,11 +866,11 @@ class Loop:
         if name not in self.claim.inputs:
             return magnitude(self.nodes[name].range)
         row = self.claim.drives[self.claim.inputs.index(name)]
-        return magnitude(self.table.over(self._kappa(row))) + self._control_noise(row) + self._beyond(row)
+        return magnitude(self.table.over(self._kappa(row))) + self._beyond(row)
 
     def _beyond(self, row: int) -> Fraction:
-        """What an input may be more than its form says."""
-        return Fraction(0)
+        """What a commanded input may be more than its form says."""
+        return self._control_noise(row)
 
     def adaptation_residual(self, i: int) -> Fraction:
         """What sampling and noise add to θ̂' in the Lyapunov function."""
@@ -879,10 +881,10 @@ class Loop:
 
 
 class Deviation(Loop):
-    """M_i z_i' = sum_j J_ij z_j + sum_k B_ik v_k + d_i around the operating point x*(t), v = -K z(t_k) + errors.
+    """M_i z_i' = sum_j J_ij z_j + sum_k B_ik e_k + d_i around the operating point x*(t).
 
-    The symbols Q are the deviations z = x - x*, the symbols e the held inputs v = u - m. x* follows from the reference:
-    the modelling term of a tracked row must not read a state.
+    The symbols Q are the deviations z = x - x*; the symbols e are u - m(x(t), r(t)) = -K z(t_k) + noise + drift, all of
+    it inside the bounds `held`. x* follows from the reference: the term of a tracked row must not read a state.
     """
 
     moving = "Qe"
@@ -1123,7 +1125,9 @@ class Period:
             shares.append((product_of(absolute(w), moving), spread))
         base, self.vertices = product_of(w, closed, back), []
         # errors of the exponentials of this method, in units of the box: of Φ, Γ and each effect
-        slack = 4 * (n + m + 2) * FIXED_ERROR * (1 + max(abs(v) for row in (*self.drive, *self.b) for v in row))
+        slack = (
+            (n * n + 4 * (n + m + 2)) * FIXED_ERROR * (1 + max(abs(v) for row in (*self.drive, *self.b) for v in row))
+        )
         error = product_of(absolute(w), [[slack] * n] * n, absolute(back))
         error = sum_of(error, product_of(absolute(w), [[slack] * m] * n, self.control))
         shaken = sum_of(shaken, product_of(absolute(w), [[slack] * m] * n, noise))
@@ -1179,14 +1183,14 @@ class Period:
             moved = sum(map(times_, moving[i], bound), Fraction(0)) + push[i]
             force = sum((magnitude(loop.entry(i, j)) * r for j, r in enumerate(claim.radii)), loop.disturbance[i])
             for k, held in enumerate(claim.held):
-                whole = held + loop.noise_of(k) + claim.period * loop.drift(k)
-                force += magnitude(loop.closed[i].get(f"e{k}", ZERO)) * whole
+                force += magnitude(loop.closed[i].get(f"e{k}", ZERO)) * held
             found.append(up(at + min(moved, claim.period * force / (2 * self.masses[i][0] * claim.radii[i]))))
         return found
 
     def inputs(self, bound: list[Fraction]) -> list[Fraction]:
-        """Bounds on |v| in units of the box."""
-        return [sum(map(times_, row, bound), Fraction(0)) for row in self.control]
+        """Bounds on |u - m|, noise and drift included, in units of the box."""
+        rows = zip(self.control, self.noise, self.drift, strict=True)
+        return [sum(map(times_, row, bound), noise + drift) for row, noise, drift in rows]
 
 
 # --- the obligations ----------------------------------------------------------------------------------------------
@@ -1331,6 +1335,9 @@ class Held:
 
     def __init__(self, claim: Claim, loop: Deviation) -> None:
         self.claim = claim
+        size, uncertain = len(loop.mass), sum(low < high for low, high in loop.mass)
+        if len(claim.cells) * (2**uncertain + 8) * size**3 > MAX_VERTICES:
+            raise NotProvedError("the certificate has more cells and vertices than this checker takes on")
         cuts = []
         for (low, high), count in zip(loop.mass, claim.split, strict=True):
             width = (high - low) / max(count, 1)

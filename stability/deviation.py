@@ -3,7 +3,7 @@
 The operating point x*(t) follows from the reference alone: x*_i is r0, zero, or the modelling term of the row that x_i
 answers to. With z = x - x* and the input u_k = m_k(x, r) + v_k,
 
-    M_i z_i' = sum_j J_ij z_j + sum_k B_ik v_k + d_i,      Q = (I + b) z,      v = -K z(t_k) + errors.
+    M_i z_i' = sum_j J_ij z_j + sum_k B_ik v_k + d_i,      Q = (I + b) z,      v = -K z(t_k) + noise + drift.
 
 Products and tanh are enclosed as in `form.py`; what plant and law share cancels.
 """
@@ -43,7 +43,7 @@ class DeviationRows:
         start: Half gains b at θ̂ = 0 by row that is tracked; z_i(0) = Q_i(0) - b_t Q_t(0). Shape (n,).
         noise: Bounds on the input errors that noise makes. Shape (m,).
         drift: Bounds on |d m_k(x(t), r(t)) / dt|. Shape (m,).
-        feedforward: Bounds on |m_k|, noise included. Shape (m,).
+        feedforward: Bounds on |m_k|. Shape (m,).
         states: Bounds on |x_i|. Shape (n,).
     """
 
@@ -133,7 +133,7 @@ class _Builder(Builder):
             drift=np.array([
                 self.symbols.range_of(self.symbols.expand(term_rates[row])).magnitude for row in self.model.drives
             ]),
-            feedforward=np.array([self._effort(row) for row in self.model.drives]),
+            feedforward=np.array([self.symbols.range_of(self._control(row)).magnitude for row in self.model.drives]),
             states=np.array([self.inputs[row.state].range.magnitude for row in self.model.rows]),
         )  # fmt: skip
 

@@ -60,7 +60,7 @@ class Cell:
 
 @dataclass(frozen=True, kw_only=True)
 class Sampled(Certificate):
-    """A sampled certificate: the box and the ball bound the deviations z_i, `held` the inputs v_k.
+    """A sampled certificate: the box and the ball bound the deviations z_i, `held` the inputs u - m, all included.
 
     Attributes:
         split: Number of equal parts of each inertia's range. Length n.
@@ -187,7 +187,7 @@ class _Search:
             rows=rows,
             image=image,
             needed=self._between(rows, image, start, radii, held),
-            inputs=image.control @ start,
+            inputs=image.control @ start + rows.noise + self.period * rows.drift,
         )
 
     def _ball(self, found: _Bounds, cell: Cell, decay: float, radii: Array, held: Array) -> Array:
@@ -257,7 +257,7 @@ class _Search:
         """Bounds on |z(t)| for all t, between samples too."""
         at_samples = np.abs(image.inverse) @ top
         moved = image.motion[0] @ top + image.motion[1]
-        return at_samples + np.minimum(moved, self.period / 2 * rates(rows, radii, held, self.period))
+        return at_samples + np.minimum(moved, self.period / 2 * rates(rows, radii, held))
 
 
 def cells_of(rows: DeviationRows, split: tuple[int, ...]) -> list[DeviationRows]:
@@ -270,11 +270,10 @@ def cells_of(rows: DeviationRows, split: tuple[int, ...]) -> list[DeviationRows]
     return parts
 
 
-def rates(rows: DeviationRows, radii: Array, held: Array, period: float) -> Array:
+def rates(rows: DeviationRows, radii: Array, held: Array) -> Array:
     """Bounds on |z_i'| over the box. Shape (n,)."""
     size = np.maximum(np.abs(rows.low), np.abs(rows.high)) @ radii
-    inputs = held + rows.noise + period * rows.drift
-    size = size + np.maximum(np.abs(rows.input_low), np.abs(rows.input_high)) @ inputs + rows.disturbance
+    size = size + np.maximum(np.abs(rows.input_low), np.abs(rows.input_high)) @ held + rows.disturbance
     return size / rows.mass_low
 
 

@@ -8,7 +8,7 @@ from hdmm_opt import gain_file, pipeline, selection, study
 from hdmm_opt.errors import DefectError
 from hdmm_opt.files import write_text
 from hdmm_opt.problem import assemble
-from hdmm_opt.proof import certificate, diagnose, longest_period, violation
+from hdmm_opt.proof import certificate, diagnose, longest_period, provable_share, shrunk, violation
 from hdmm_opt.selection import Options, Progress
 from hdmm_opt.simulation import ClosedLoop
 from stability import Certificate, Failure, Gains, certify, checker
@@ -127,3 +127,15 @@ def test_a_tolerance_left_out_is_that_of_the_plant():
     data = study.load("emla-p2").model_dump(exclude_none=True)
     data["plant"]["parameters"]["load_mass"].pop("tolerance")
     assert study.validated(data, "test").plant.resolved()["load_mass"].tolerance == 0.2
+
+
+def test_the_share_of_uncertainty_that_would_pass_passes():
+    """Gains that are too weak for the study's load are proved for the share of it that the diagnosis names."""
+    problem = assemble(study.load("emla-p4-fast"))
+    weak = (Gains(beta=10.0), Gains(beta=3000.0))
+    told = diagnose(problem, weak)[-1]
+    assert told.name == "uncertainty" and told.sure and -1 < told.margin < 0
+    share = provable_share(problem, weak)
+    for factor, good in ((1.0, True), (1.02, False)):
+        smaller = replace(problem, bounds=shrunk(problem.bounds, factor * share))
+        assert (violation(smaller, certificate(smaller, weak), weak) == 0.0) == good

@@ -293,6 +293,8 @@ MUTATIONS = {
     "no cells": set_at("certificate", "cells", value=[]),
     "no split": set_at("certificate", "split", value=[]),
     "split into nothing": set_at("certificate", "split", value=[0, 0, 0]),
+    "sixty-four cells": lambda data: data["certificate"].update(split=[1, 8, 8], cells=data["certificate"]["cells"][:1] * 64),
+    "coordinates of many digits": set_at("certificate", "cells", 0, "transform", 1, 1, value="1" * 100 + "/" + "3" * 100),
     "another split": set_at("certificate", "split", value=[2, 2, 1]),
     "a box that hardly moves": rational("radii", Fraction(1, 10**40), 2),
     "smaller ball": ball(Fraction(95, 100)),

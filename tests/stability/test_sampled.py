@@ -1,10 +1,13 @@
 """The sampled certificate against worst cases that are computed without it."""
 
+from dataclasses import replace
+
+import casadi as ca
 import numpy as np
 import pytest
 from known_answers import DISTURBANCE, certify_sampled_chain, chain_bounds, claim_of, integrator_chain, verdict
 
-from stability import Bounds, Failure, Gains, Sampled, certify_sampled
+from stability import Bounds, Failure, Gains, Interval, LoopModel, Row, Sampled, certify_sampled, from_casadi
 
 
 def bound(found):
@@ -137,6 +140,32 @@ def test_cells_and_coordinates_only_help():
 
 def test_a_continuous_law_is_no_business_of_this_certificate():
     assert isinstance(certify_sampled_chain((15.0, 100.0)), Failure)
+
+
+def near_a_wall(noise):
+    """x' = u + c / (U - u): harmless unless the input, with its noise, comes near U."""
+    z, y = ca.SX.sym("z", 3), ca.SX.sym("y", 2)
+    force = z[1] + z[2] + 1e-6 / (0.16 - z[1])
+    plant = from_casadi(ca.Function("plant", [z], [ca.vertcat(1.0, force)]), ("x", "u", "w"))
+    term = from_casadi(ca.Function("term", [y], [ca.SX(0)]), ("x", "r1"))
+    row = Row(state="x", unit="m", target="reference", governed=True)
+    model = LoopModel(rows=(row,), drives=(0,), inputs=("u",), plant=plant, law=(term,))
+    bounds = Bounds(
+        parameters={}, disturbances={"w": Interval(0.0)}, nominal={}, reference=(Interval(0.0),) * 4, noise=(noise,),
+        initial=(0.0,), period=1e-3,
+    )  # fmt: skip
+    gains = (Gains(beta=20.0),)
+    return model, bounds, gains, certify_sampled(model, bounds, gains, np.array([1.0]))
+
+
+def test_the_input_is_bounded_with_its_noise():
+    """With noise of 0.01 an adversary can bring the input to the wall, where no bound holds; with 0.004 it cannot."""
+    model, bounds, gains, found = near_a_wall(0.004)
+    assert verdict(claim_of(model, bounds, gains, found))
+    assert isinstance(near_a_wall(0.01)[3], Failure)
+    forged = replace(found, held=np.array([0.1005]), radii=np.array([0.010152]), ball=np.array([0.010112]))
+    louder = replace(bounds, noise=(0.01,))
+    assert not verdict(claim_of(model, louder, gains, forged))
 
 
 def test_a_stuck_actuator_is_never_proved():
