@@ -37,7 +37,7 @@ MAX_BYTES, MAX_DIGITS, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 20_000_000, 
 #: Cells of a sampled certificate, digits of its numbers, and (vertices + 8) n³ summed over its cells.
 MAX_CELLS, MAX_CELL_DIGITS, MAX_VERTICES = 64, 60, 40_000
 #: Interval products that one check may take; a file of ours takes a few per cent of it.
-MAX_PRODUCTS = 300_000
+MAX_PRODUCTS = 100_000
 #: Relative width given to every gain, so that the proof holds for its decimal, its float64 and its float32.
 ROUNDING = Fraction(1, 2**23)
 BITS, MAX_SHIFT = 96, 3_000

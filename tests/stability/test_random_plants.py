@@ -16,7 +16,9 @@ LANES, PERIODS, SUBSTEPS = 24, 240, 6
 
 @dataclass(frozen=True)
 class Case:
-    """M_i x_i' = -c_i x_i - f_i tanh(x_i / s_i) + g_i x_{i+1} + w_i, with u in the place of x_{n+1}."""
+    """M_i x_i' = -c_i x_i - f_i tanh(x_i / s_i) + g_i y_i + w_i with y_i = x_{i+1}, and for the last row
+    y_n = u + bend tanh(u / size); the law adds `known` x_n to its last virtual control.
+    """
 
     model: LoopModel
     bounds: Bounds
@@ -25,6 +27,9 @@ class Case:
     damping: np.ndarray
     friction: np.ndarray
     scale: np.ndarray
+    known: float
+    bend: float
+    size: float
 
 
 def random_case(family: str, seed: int) -> Case:
@@ -48,12 +53,20 @@ def random_case(family: str, seed: int) -> Case:
     names = [f"x{i}" for i in range(n)]
     order = (*names, "u", *(f"m{i}" for i in range(n)), *(f"g{i}" for i in range(n)), *(f"w{i}" for i in range(n)))
     z = ca.SX.sym("z", len(order))
-    x, following = z[:n], ca.vertcat(z[1 : n + 1])
+    # in every second case the law compensates part of the last row's damping, from its measured state, and the input bends
+    nonlinear = bool(random.integers(0, 2))
+    known = float(nonlinear * random.uniform(0, 1) * damping[-1] / drive[-1])
+    size_u = float(mass[-1] * width[-1] * size[-1] / drive[-1])
+    bend = float(nonlinear * random.uniform(-0.2, 0.2) * 0.1 * size_u)
+    last = z[n] + bend * ca.tanh(z[n] / (0.1 * size_u))
+    x, following = z[:n], ca.vertcat(z[1:n], last)
     m, g, w = z[n + 1 : 2 * n + 1], z[2 * n + 1 : 3 * n + 1], z[3 * n + 1 :]
     force = ca.vertcat(*(
         -damping[i] * x[i] - friction[i] * ca.tanh(x[i] / scale[i]) + g[i] * following[i] + w[i] for i in range(n)
     ))  # fmt: skip
     plant = from_casadi(ca.Function("plant", [z], [ca.vertcat(m, force)]), order)
+    y = ca.SX.sym("y", 1)
+    closing = from_casadi(ca.Function("term", [y], [known * y[0]]), (names[-1],))
     nothing = from_casadi(ca.Function("term", [ca.SX.sym("r")], [ca.SX(0)]), ("r0",))
     rows = tuple(
         Row(state=s, unit="1", target="reference" if i == 0 else i - 1, governed=True) for i, s in enumerate(names)
@@ -76,8 +89,8 @@ def random_case(family: str, seed: int) -> Case:
         Gains(beta=float(2 * wd * mi / gi), epsilon=float(e), delta=0.5, sigma=float(0.5 / period))
         for wd, mi, gi, e in zip(width, mass, drive, epsilon, strict=True)
     )
-    model = LoopModel(rows=rows, drives=(n - 1,), inputs=("u",), plant=plant, law=(nothing,) * n)
-    return Case(model, bounds, gains, 1e3 * size, damping, friction, scale)
+    model = LoopModel(rows=rows, drives=(n - 1,), inputs=("u",), plant=plant, law=(*(nothing,) * (n - 1), closing))
+    return Case(model, bounds, gains, 1e3 * size, damping, friction, scale, known, bend, 0.1 * size_u)
 
 
 def attack(case: Case, seed: int) -> np.ndarray:
@@ -103,7 +116,7 @@ def attack(case: Case, seed: int) -> np.ndarray:
     step, found = bounds.period / SUBSTEPS, [np.abs(x[0])]
 
     def rate(x, u, w):
-        following = np.vstack([x[1:], u[None]])
+        following = np.vstack([x[1:], (u + case.bend * np.tanh(u / case.size))[None]])
         friction = case.friction[:, None] * np.tanh(x / case.scale[:, None])
         return (-case.damping[:, None] * x - friction + drive * following + w) / mass
 
@@ -115,6 +128,7 @@ def attack(case: Case, seed: int) -> np.ndarray:
             error = measured[i] - goal
             goal = -(beta[i] + epsilon[i] * theta[i]) * error / 2
             theta[i] += bounds.period * (epsilon[i] * delta[i] * error**2 / 2 - delta[i] * sigma[i] * theta[i])
+        goal = goal + case.known * measured[-1]
         for _ in range(SUBSTEPS):
             w = limit * side
             a = rate(x, goal, w)
