@@ -117,6 +117,11 @@ def assemble(study: Study, reference: Reference | None = None) -> Problem:
     initial = _by_state("uncertainty.initial", study.uncertainty.initial, plant)
     ranges = _ranges(study, law)
     reference = build_reference(study, plant) if reference is None else reference
+    if not study.validation.transient_s < reference.duration:
+        raise InvalidInputError(
+            f"validation.transient_s ends before the reference does: got {study.validation.transient_s:g} s of "
+            f"{reference.duration:g} s; shorten the transient"
+        )
     low, high = study.uncertainty.load_force_n
     nominal = {**plant.values(), "load_force": (low + high) / 2}
     bounds = Bounds(

@@ -1450,6 +1450,7 @@ def vacuity(claim: Claim) -> Fraction:
 
 def obligations(claim: Claim) -> list[Obligation]:
     """Decide every obligation of the law."""
+    Work.products = 0
     made: list[Obligation] = []
 
     def state(name: str, statement: str, margin: Fraction, unit: str, remedy: str, strict: bool = True) -> None:
@@ -1561,7 +1562,6 @@ def check_text(text: str, file: str = "") -> Report:
     Returns:
         Status 0 proved, 1 not proved, 2 unreadable; with one line and the obligations.
     """
-    Work.products = 0
     try:
         data = parse(text)
         need(data.get("schema") == SCHEMA, wrong_schema(data.get("schema")))

@@ -67,6 +67,12 @@ _INTERVAL: dict[str, Callable[..., Interval]] = {
     "sq": Interval.square,
     "sqrt": Interval.sqrt,
     "tanh": Interval.tanh,
+    "sin": Interval.sin,
+    "cos": Interval.cos,
+    "exp": Interval.exp,
+    "abs": Interval.abs,
+    "min": Interval.minimum,
+    "max": Interval.maximum,
 }
 
 _FLOAT: dict[str, Callable[..., float]] = {
@@ -78,6 +84,12 @@ _FLOAT: dict[str, Callable[..., float]] = {
     "sq": lambda a: a * a,
     "sqrt": math.sqrt,
     "tanh": math.tanh,
+    "sin": math.sin,
+    "cos": math.cos,
+    "exp": math.exp,
+    "abs": math.fabs,
+    "min": lambda a, b: min(a, b),
+    "max": lambda a, b: max(a, b),
 }
 
 
@@ -131,7 +143,8 @@ def from_casadi(function: Any, names: tuple[str, ...]) -> Expression:
             work[targets[0]] = known[code](builder, *(work[i] for i in sources))
         else:
             raise NotImplementedError(
-                f"the prover bounds + - * / square sqrt tanh: CasADi instruction {code} came in {function.name()}; "
+                f"the prover bounds + - * / {' '.join(list(_INTERVAL)[5:])}: CasADi instruction {code} came in "
+                f"{function.name()}; "
                 "rewrite the model with those"
             )
     outputs = tuple(results[i] if i in results else builder.const(0.0) for i in range(function.numel_out(0)))
@@ -164,6 +177,12 @@ def _casadi_operators(ca: Any) -> dict[int, Callable[..., int]]:
         ca.OP_SQ: lambda b, i: b.add("sq", i),
         ca.OP_SQRT: lambda b, i: b.add("sqrt", i),
         ca.OP_TANH: lambda b, i: b.add("tanh", i),
+        ca.OP_SIN: lambda b, i: b.add("sin", i),
+        ca.OP_COS: lambda b, i: b.add("cos", i),
+        ca.OP_EXP: lambda b, i: b.add("exp", i),
+        ca.OP_FABS: lambda b, i: b.add("abs", i),
+        ca.OP_FMIN: lambda b, i, j: b.add("min", i, j),
+        ca.OP_FMAX: lambda b, i, j: b.add("max", i, j),
         ca.OP_TWICE: lambda b, i: b.add("mul", b.const(2.0), i),
         ca.OP_INV: lambda b, i: b.add("div", b.const(1.0), i),
         ca.OP_ASSIGN: lambda b, i: i,

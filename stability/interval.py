@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 
 _LOW, _HIGH = -math.inf, math.inf
+_FAR = 1e5
 
 
 def _down(value: float) -> float:
@@ -95,6 +96,51 @@ class Interval:
         for _ in range(4):
             low, high = _down(low), _up(high)
         return Interval(max(-1.0, low), min(1.0, high))
+
+    def exp(self) -> Interval:
+        """The range of the exponential, widened like `tanh`; infinite where it overflows."""
+        ends = [math.exp(v) if v < 709.0 else math.inf for v in (self.low, self.high)]
+        low, high = min(ends[0], 8e307), ends[1]
+        for _ in range(4):
+            low, high = _down(low), _up(high)
+        return Interval(max(0.0, low), high)
+
+    def sin(self) -> Interval:
+        """The range of the sine; [-1, 1] far from zero, where a float does not know its phase."""
+        if self.magnitude > _FAR or self.high - self.low >= 2 * math.pi:
+            return Interval(-1.0, 1.0)
+        ends = math.sin(self.low), math.sin(self.high)
+        low, high = min(ends), max(ends)
+        for _ in range(4):
+            low, high = _down(low), _up(high)
+        if self._passes(-math.pi / 2):
+            low = -1.0
+        if self._passes(math.pi / 2):
+            high = 1.0
+        return Interval(max(-1.0, low), min(1.0, high))
+
+    def cos(self) -> Interval:
+        """The range of the cosine."""
+        return (self + Interval(_down(math.pi / 2), _up(math.pi / 2))).sin()
+
+    def abs(self) -> Interval:
+        """The range of the absolute value."""
+        small = 0.0 if self.low <= 0.0 <= self.high else min(abs(self.low), abs(self.high))
+        return Interval(small, self.magnitude)
+
+    def minimum(self, other: Interval) -> Interval:
+        """The range of the smaller of two."""
+        return Interval(min(self.low, other.low), min(self.high, other.high))
+
+    def maximum(self, other: Interval) -> Interval:
+        """The range of the larger of two."""
+        return Interval(max(self.low, other.low), max(self.high, other.high))
+
+    def _passes(self, phase: float) -> bool:
+        """Whether phase + 2πk may lie inside, with room for rounding."""
+        room = 1e-9
+        first = math.ceil((self.low - phase - room) / (2 * math.pi))
+        return first <= math.floor((self.high - phase + room) / (2 * math.pi))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Interval) and (self.low, self.high) == (other.low, other.high)

@@ -66,6 +66,7 @@ CASES = {
     "absurd number": (lambda: swapped("value = 2000.0", "value = 1e300"), "must be within"),
     "absurd rate": (lambda: swapped("rate_hz = 1000", "rate_hz = 1e6"), "100000: got 1000000"),
     "no waypoints": (lambda: swapped("[0.1, 0.4, 0.1]", "[]"), "at least 2 entries: got []"),
+    "transient without an end": (lambda: swapped("transient_s = 1.0", "transient_s = 30.0"), "validation.transient_s ends before"),
     "waypoint on the edge": (lambda: swapped("[0.1, 0.4, 0.1]", "[0.0, 0.25, 0.0]"), "with room for the"),
     "text for a list": (lambda: swapped("modelling = []", 'modelling = "mechanics"'), "must be a list"),
     "missing duration": (lambda: swapped("durations_s = [7.0, 7.0]", "durations_s = [7.0]"), "each of the 2 moves: got 1"),
@@ -83,7 +84,7 @@ def test_bad_input_is_one_helpful_line(case):
     make, expected = CASES[case]
     message = refusal(make())
     assert expected in message, message
-    assert re.match(r"(mine\.toml|reference|controller|unknown key|\"controller|controller)", message)
+    assert re.match(r"(mine\.toml|reference|controller|validation|unknown key|\"controller|controller)", message)
 
 
 def test_a_missing_file_or_name():
