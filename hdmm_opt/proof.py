@@ -149,13 +149,43 @@ def diagnose(problem: Problem, gains: tuple[Gains, ...]) -> list[Verdict]:
     """Why some gains are not proved: the failing obligations, the cause before its consequences.
 
     The continuous law is looked at first: what fails there (gain conditions, authority, accuracy) does not come from
-    sampling. Authority is refuted where a simulated run inside the assumptions asks for more than the limit.
+    sampling. Authority is refuted where a simulated run inside the assumptions asks for more than the limit, the rest
+    where one diverges or breaks the required error.
     """
     continuous = certificate(problem, gains, period=0.0)
     found = [*_authority(problem, gains, continuous), *_conditions(problem, continuous)]
     if not found:
         found = [*_sampling(problem, gains)]
-    return [*found, *_uncertainty(problem, gains)]
+    return [*_refuted(problem, gains, found), *_uncertainty(problem, gains)]
+
+
+def _refuted(problem: Problem, gains: tuple[Gains, ...], found: list[Verdict]) -> list[Verdict]:
+    """The verdicts, the first of them refuted where a run inside the assumptions breaks the required error.
+
+    Tried are the scenarios of the study, and the first of them with each parameter at either end of its tolerance.
+    """
+    if found[0].verdict == "refuted":
+        return found
+    required = problem.study.requirements.tracking_error_m
+    tried = scenarios(problem.study)
+    uncertain = [name for name, p in problem.plant.parameters.items() if p.tolerance > 0]
+    tried += [replace(tried[0], parameters={name: end}) for name in uncertain for end in (-1.0, 1.0)]
+    for scenario in tried:
+        trace = problem.loop.run(gains, problem.reference, scenario)
+        late = np.abs(trace.error[trace.t >= problem.bounds.transient])
+        if trace.diverged or late.max(initial=0.0) > required:
+            corner = "".join(
+                f" and {name} at its {'upper' if v > 0 else 'lower'} end" for name, v in scenario.parameters.items()
+            )
+            seen = "diverges" if trace.diverged else f"reaches {1e3 * late.max():.4g} mm of {1e3 * required:.4g} mm"
+            first = replace(
+                found[0],
+                verdict="refuted",
+                statement=f'{found[0].statement}; simulated with scenario "{scenario.name}"{corner} the loop {seen}',
+                witness={"scenario": asdict(scenario), "rate_hz": 1 / problem.bounds.period},
+            )
+            return [first, *found[1:]]
+    return found
 
 
 def provable_share(problem: Problem, gains: tuple[Gains, ...]) -> float:

@@ -39,11 +39,11 @@ corners and draws: {{ "%.4g"|format(late) }} mm.</p>
 <p>Tolerances are assumed wherever the source gives none.</p>
 <h2>What else is assumed</h2>
 <table><tr><th>quantity<th class="n">from<th class="n">to<th>unit<th>source</tr>
-{% for a in assumptions %}<tr><td>{{ a.name }}<td class="n">{{ "%.6g"|format(a.lower) }}
+{% for a in assumptions %}<tr><td>{{ a.name }}<td class="n">{{ "%.6g"|format(a.lower + 0) }}
 <td class="n">{{ "%.6g"|format(a.upper) }}<td>{{ a.unit }}<td>{{ a.source }}</tr>{% endfor %}
 {% for x in limits %}<tr><td>limit on {{ x.name }}<td class="n">0<td class="n">{{ "%.6g"|format(x.value) }}
 <td>{{ x.unit }}<td>{{ x.source }}</tr>{% endfor %}
-<tr><td>stroke<td class="n">{{ stroke[0] }}<td class="n">{{ stroke[1] }}<td>m<td>study</tr>
+<tr><td>stroke<td class="n">{{ stroke[0] }}<td class="n">{{ stroke[1] }}<td>m<td>plant</tr>
 <tr><td>control rate<td class="n">{{ rate }}<td class="n">{{ rate }}<td>Hz<td>study</tr></table>
 <p>A positive load pushes the rod back in; noise bounds hold at every sample; initial errors are those of the
 subsystems at the start. The statement and its proof have the hash {{ sha }}.</p>

@@ -175,7 +175,7 @@ class _Search:
         image = comparison(rows, self.period, transform)
         reach = least_reach(image.vertices)
         if reach is None:
-            return Failure(reason="the sampled loop has no positive comparison system that contracts", row=n - 1)
+            return Failure(reason=_obstacle(image, self.period), row=n - 1)
         start = least_reach([*image.vertices, (np.zeros((n, n)), self._start(transform, rows))])
         if start is None:
             return Failure(reason="the initial errors lead out of every contracting set", row=n - 1)
@@ -258,6 +258,21 @@ class _Search:
         at_samples = np.abs(image.inverse) @ top
         moved = image.motion[0] @ top + image.motion[1]
         return at_samples + np.minimum(moved, self.period / 2 * rates(rows, radii, held))
+
+
+def _obstacle(image: Map, period: float) -> str:
+    """Why a loop has no comparison system that contracts, by the poles of its nominal map."""
+    poles = np.linalg.eigvals(image.nominal)
+    largest = poles[np.argmax(np.abs(poles))]
+    if abs(largest) >= 1:
+        return f"the nominal sampled loop is unstable, with a pole of size {abs(largest):.4g} at {1 / period:g} Hz"
+    text = "no positive comparison system contracts"
+    turning = max(poles, key=lambda pole: abs(pole.imag))
+    if abs(turning.imag) > 1e-6:
+        return (
+            f"{text}: the map has poles at {turning.real:.3g} ± {abs(turning.imag):.2g}i, the bandwidths are too close"
+        )
+    return f"{text}: the uncertainty is too large for poles at {', '.join(f'{p.real:.3g}' for p in poles)}"
 
 
 def cells_of(rows: DeviationRows, split: tuple[int, ...]) -> list[DeviationRows]:

@@ -10,7 +10,7 @@ from hdmm_opt.files import write_text
 from hdmm_opt.problem import assemble
 from hdmm_opt.proof import certificate, diagnose, longest_period, provable_share, shrunk, violation
 from hdmm_opt.selection import Options, Progress
-from hdmm_opt.simulation import ClosedLoop
+from hdmm_opt.simulation import ClosedLoop, Scenario
 from stability import Certificate, Failure, Gains, certify, checker
 
 
@@ -65,7 +65,11 @@ def test_diagnosis_names_the_cause_before_its_consequences():
     first = diagnose(problem, crossed)[0]
     assert first.name == "composition" and first.margin < 0 and first.remedy
     weak = (Gains(beta=8.0), Gains(beta=5000.0))
-    assert diagnose(problem, weak)[0].name == "accuracy"
+    accuracy = diagnose(problem, weak)[0]
+    assert accuracy.name == "accuracy" and accuracy.verdict == "refuted" and "mm of 2 mm" in accuracy.statement
+    witness = Scenario(**accuracy.witness["scenario"])
+    error = np.abs(problem.loop.run(weak, problem.reference, witness).error)
+    assert error.max() > 2e-3
     strong = (Gains(beta=40.0), Gains(beta=9000.0))
     assert diagnose(problem, strong)[0].name in ("authority", "sampling")
 
