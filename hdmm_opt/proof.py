@@ -13,7 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from stability import Bounds, Certificate, Composition, Failure, Gains, Interval, certify, certify_sampled
+from stability import (
+    Bounds,
+    Certificate,
+    Composition,
+    Failure,
+    Gains,
+    Interval,
+    certify,
+    certify_sampled,
+    deviation_rows,
+    quadratic,
+)
 
 from .control import RAC
 from .problem import Problem
@@ -84,15 +95,30 @@ def _rank(problem: Problem, found: Certificate | Failure, gains: tuple[Gains, ..
 
 
 def compared(problem: Problem, gains: tuple[Gains, ...], found: Certificate) -> str:
-    """Which certificate was taken, and what the other kind would have given."""
-    other: Certificate | Failure
+    """Which certificate was taken, and what the other kinds would have given."""
+    others: dict[str, str] = {}
     if isinstance(found, Composition):
-        name, label = "composition", "sampled"
-        other = certify_sampled(problem.model, problem.bounds, gains, problem.box)
+        name = "composition"
+        others["sampled"] = _told(certify_sampled(problem.model, problem.bounds, gains, problem.box))
     else:
-        name, label, other = "sampled", "composition", composition(problem, problem.bounds, gains)
-    told = other.reason if isinstance(other, Failure) else f"{1e3 * float(other.ball[0]):.4g} mm"
-    return f"{name} certificate, {1e3 * float(found.ball[0]):.4g} mm ({label}: {told})"
+        name = "sampled"
+        others["composition"] = _told(composition(problem, problem.bounds, gains))
+        others["quadratic, at the samples"] = quadratic_bound(problem, gains, found)
+    text = ", ".join(f"{key}: {value}" for key, value in others.items())
+    return f"{name} certificate, {_told(found)} ({text})"
+
+
+def _told(found: Certificate | Failure) -> str:
+    return found.reason if isinstance(found, Failure) else f"{1e3 * float(found.ball[0]):.4g} mm"
+
+
+def quadratic_bound(problem: Problem, gains: tuple[Gains, ...], found: Certificate) -> str:
+    """The ultimate bound at the samples by one ellipsoid for the exact map, over the box of a sampled certificate."""
+    rows = deviation_rows(problem.model, problem.bounds, gains, found.radii, found.held)
+    inclusion = quadratic.from_period(rows, problem.bounds.period, found.radii)
+    ellipsoid = quadratic.search(inclusion, np.eye(len(found.radii))[0], found.radii)
+    squared = None if ellipsoid is None else quadratic.prove(inclusion, ellipsoid)
+    return "none" if squared is None else f"{1e3 * math.sqrt(squared):.4g} mm"
 
 
 def slacks(problem: Problem, found: Certificate) -> list[tuple[str, float, float, str]]:
