@@ -110,7 +110,8 @@ def funnel_margins(
     Raises:
         ValueError: ρ outside (0, 1).
 
-    Not guaranteed: that there is no larger funnel gain; the sampled form bounds the held input's error by a constant.
+    Not guaranteed: tightness; the sampled form bounds the held input's error by a constant. Measurement noise and the
+    rounding of the controller are not covered.
     """
     if not 0 < share < 1:
         raise ValueError(f"the unused share of a funnel lies between 0 and 1: got {share:g}; try 0.2")
