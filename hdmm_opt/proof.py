@@ -186,7 +186,7 @@ def diagnose(problem: Problem, gains: tuple[Gains, ...]) -> list[Verdict]:
 
 
 def _refuted(problem: Problem, gains: tuple[Gains, ...], found: list[Verdict]) -> list[Verdict]:
-    """The verdicts, the first of them refuted where a run inside the assumptions breaks the required error.
+    """The verdicts, with a refutation where a run inside the assumptions diverges or breaks the required error.
 
     Tried are the scenarios of the study, and the first of them with each parameter at either end of its tolerance.
     """
@@ -204,13 +204,16 @@ def _refuted(problem: Problem, gains: tuple[Gains, ...], found: list[Verdict]) -
                 f" and {name} at its {'upper' if v > 0 else 'lower'} end" for name, v in scenario.parameters.items()
             )
             seen = "diverges" if trace.diverged else f"reaches {1e3 * late.max():.4g} mm of {1e3 * required:.4g} mm"
-            first = replace(
-                found[0],
-                verdict="refuted",
-                statement=f'{found[0].statement}; simulated with scenario "{scenario.name}"{corner} the loop {seen}',
-                witness={"scenario": asdict(scenario), "rate_hz": 1 / problem.bounds.period},
-            )
-            return [first, *found[1:]]
+            run = f'simulated with scenario "{scenario.name}"{corner} the loop {seen}'
+            witness = {"scenario": asdict(scenario), "rate_hz": 1 / problem.bounds.period}
+            if trace.diverged or found[0].name == "accuracy":
+                text = f"{found[0].statement}; {run}"
+                return [replace(found[0], verdict="refuted", statement=text, witness=witness), *found[1:]]
+            broken = Verdict(
+                name="accuracy", statement=run, margin=required - float(late.max()), unit="m", verdict="refuted",
+                remedy=f"larger gains, or a requirement above {1e3 * late.max():.4g} mm", witness=witness,
+            )  # fmt: skip
+            return [*found, broken]
     return found
 
 
