@@ -96,13 +96,21 @@ _FLOAT: dict[str, Callable[..., float]] = {
 def run(
     expression: Expression, read: Callable[[str], T], operators: Mapping[str, Callable[..., T]], const: Callable[..., T]
 ) -> list[T]:
-    """Run the program in any arithmetic; returns the value of every entry."""
+    """Run the program in any arithmetic; returns the value of every entry.
+
+    Raises:
+        NotImplementedError: an operation that this arithmetic does not have; the message names it.
+    """
     table: list[T] = []
     for operator, *arguments in expression.operations:
         if operator == "input":
             table.append(read(arguments[0]))
         elif operator == "const":
             table.append(const(float(arguments[0])))
+        elif operator not in operators:
+            raise NotImplementedError(
+                f"this needs a model of {', '.join(operators)}: got {operator}; rewrite the model with those"
+            )
         else:
             table.append(operators[operator](*(table[index] for index in arguments)))
     return table

@@ -66,7 +66,7 @@ class FunnelRow:
     def width(self, start: float, end: float) -> Interval:
         """Range of o(t) for t in [start, end]; `end` may be infinite."""
         spare = Interval(self.shoot) - Interval(self.bound)
-        early, late = _decayed(self.rate * start), _decayed(self.rate * end)
+        early, late = ((-(Interval(self.rate) * Interval(t))).exp() for t in (start, end))
         return Interval(self.bound) + spare * Interval(late.low, early.high)
 
 
@@ -125,14 +125,6 @@ def funnel_margins(
     return tuple(found.values())
 
 
-def _decayed(exponent: float) -> Interval:
-    value = math.exp(-min(exponent, 700.0)) if math.isfinite(exponent) else 0.0
-    low = high = value
-    for _ in range(4):
-        low, high = math.nextafter(low, -math.inf), math.nextafter(high, math.inf)
-    return Interval(max(low, 0.0), high)
-
-
 class _Window:
     """All quantities on one part of the time axis."""
 
@@ -144,10 +136,10 @@ class _Window:
         self.shrink = [
             (width - Interval(row.bound)) * Interval(row.rate) for row, width in zip(rows, self.width, strict=True)
         ]
-        kept = Interval(1.0) - Interval(share)
-        self.radius = [kept * width for width in self.width]
+        self.kept = Interval(1.0) - Interval(share)
+        self.radius = [self.kept * width for width in self.width]
         # o² - Q² >= o² (1 - (1 - ρ)²) on the set
-        self.rest = Interval(1.0) - kept.square()
+        self.rest = Interval(1.0) - self.kept.square()
 
     def margins(self) -> list[Margin]:
         half, made = Interval(0.5), []
@@ -157,14 +149,11 @@ class _Window:
             radius, gap = self.radius[i], self.width[i].square() * self.rest
             slope = radius / gap
             # θ̂ may be as large as the narrowest funnel makes it, where |Q| / (o² - Q²) is largest
-            narrow = (Interval(1.0) - Interval(self.share)) / (Interval(row.bound) * self.rest)
+            narrow = self.kept / (Interval(row.bound) * self.rest)
             theta = _largest(Interval(row.epsilon) * narrow.square() / (Interval(2.0) * Interval(row.sigma)))
             local = half * (
                 Interval(row.beta)
-                + Interval(row.epsilon)
-                * theta
-                * (Interval(1.0) + (Interval(1.0) - Interval(self.share)).square())
-                / (gap * self.rest)
+                + Interval(row.epsilon) * theta * (Interval(1.0) + self.kept.square()) / (gap * self.rest)
             )
             control = _largest(half * (Interval(row.beta) + Interval(row.epsilon) * theta / gap) * radius)
             following = self.radius[i + 1] if i < last else Interval(0.0)
@@ -175,9 +164,7 @@ class _Window:
             shrunk = Interval(row.epsilon) * theta * radius * self.width[i] * self.shrink[i] / gap.square()
             rate = _largest(local * speed + moved + shrunk)
             held = self.period * rate * Interval(row.gain.high) if i == last else Interval(0.0)
-            outward = (
-                Interval(row.gain.high) * following + push + self.shrink[i] * (Interval(1.0) - Interval(self.share))
-            )
+            outward = Interval(row.gain.high) * following + push + self.shrink[i] * self.kept
             pull = half * Interval(row.gain.low) * Interval(row.beta) * radius
             made.append(
                 _margin(f"funnel {i + 1}", "|Q| stays below (1 - ρ) o", (pull - outward - held).low, 2.0 * pull.low)

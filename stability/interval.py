@@ -17,6 +17,13 @@ def _up(value: float) -> float:
     return math.nextafter(value, _HIGH)
 
 
+def _libm(low: float, high: float) -> tuple[float, float]:
+    """Results of the C library widened by four units in the last place: it is not correctly rounded."""
+    for _ in range(4):
+        low, high = _down(low), _up(high)
+    return low, high
+
+
 class Interval:
     """A closed interval [low, high] that contains the exact result of every operation on its members.
 
@@ -91,18 +98,14 @@ class Interval:
         return Interval(max(0.0, _down(math.sqrt(self.low))), _up(math.sqrt(self.high)))
 
     def tanh(self) -> Interval:
-        """The range of tanh, widened by four units in the last place (libm is not correctly rounded)."""
-        low, high = math.tanh(self.low), math.tanh(self.high)
-        for _ in range(4):
-            low, high = _down(low), _up(high)
+        """The range of tanh."""
+        low, high = _libm(math.tanh(self.low), math.tanh(self.high))
         return Interval(max(-1.0, low), min(1.0, high))
 
     def exp(self) -> Interval:
-        """The range of the exponential, widened like `tanh`; infinite where it overflows."""
+        """The range of the exponential; infinite where it overflows."""
         ends = [math.exp(v) if v < 709.0 else math.inf for v in (self.low, self.high)]
-        low, high = min(ends[0], 8e307), ends[1]
-        for _ in range(4):
-            low, high = _down(low), _up(high)
+        low, high = _libm(min(ends[0], 8e307), ends[1])
         return Interval(max(0.0, low), high)
 
     def sin(self) -> Interval:
@@ -110,9 +113,7 @@ class Interval:
         if self.magnitude > _FAR or self.high - self.low >= 2 * math.pi:
             return Interval(-1.0, 1.0)
         ends = math.sin(self.low), math.sin(self.high)
-        low, high = min(ends), max(ends)
-        for _ in range(4):
-            low, high = _down(low), _up(high)
+        low, high = _libm(min(ends), max(ends))
         if self._passes(-math.pi / 2):
             low = -1.0
         if self._passes(math.pi / 2):

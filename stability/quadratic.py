@@ -162,31 +162,25 @@ def _grid(unit: Inclusion) -> Array:
     return top * np.array([0.1, 0.25, 0.4, 0.55, 0.7, 0.85]) if top > 0 else np.zeros(0)
 
 
-def inequality(inclusion: Inclusion, p: Any, tau: Any, multipliers: Any, decay: Any, *, zero: Any = 0.0) -> Any:
-    """The matrix that must be positive definite, in any arithmetic; lists of rows.
+def inequality(inclusion: Inclusion, p: Array, tau: Array, multipliers: Array, decay: Any) -> Array:
+    """The matrix that must be positive definite, linear in (P, τ, Λ); floats, or fractions in arrays of objects.
 
     Blocks over (z, w, δ): ``-(A'P + PA + αP + R'ΛR), -PB, -PL; diag τ, 0; Λ``, or for a map
     ``(1 - α)P - R'ΛR - A'PA, …, diag τ - B'PB, …, Λ - L'PL``.
     """
-    blocks: list[Any] = [inclusion.a, inclusion.b, inclusion.left, inclusion.right]
-    a, b, left, right = (m.tolist() if isinstance(m, np.ndarray) else m for m in blocks)
-    n, m, k = len(a), len(b[0]), len(left[0])
-    whole = [[*a[i], *b[i], *left[i]] for i in range(n)]
-    pw = [[sum((p[i][s] * whole[s][j] for s in range(n)), zero) for j in range(n + m + k)] for i in range(n)]
-    size = n + m + k
-    result = [[zero] * size for _ in range(size)]
-    for i in range(size):
-        for j in range(size):
-            if inclusion.sampled:
-                result[i][j] -= sum((whole[s][i] * pw[s][j] for s in range(n)), zero)
-            else:
-                result[i][j] -= (pw[i][j] if i < n else zero) + (pw[j][i] if j < n else zero)
-    for i in range(n):
-        for j in range(n):
-            kept = (1 - decay) * p[i][j] if inclusion.sampled else -decay * p[i][j]
-            result[i][j] += kept - sum((right[s][i] * multipliers[s] * right[s][j] for s in range(k)), zero)
-    for j, value in enumerate([*tau, *multipliers]):
-        result[n + j][n + j] += value
+    n = len(p)
+    whole = np.hstack([inclusion.a, inclusion.b, inclusion.left])
+    forward = p @ whole
+    result = np.zeros((whole.shape[1],) * 2, dtype=forward.dtype)
+    if inclusion.sampled:
+        result -= whole.T @ forward
+    else:
+        result[:n] -= forward
+        result[:, :n] -= forward.T
+    result[:n, :n] += (1 - decay) * p if inclusion.sampled else -decay * p
+    for size, row in zip(multipliers, inclusion.right, strict=True):
+        result[:n, :n] -= size * np.outer(row, row)
+    result[np.diag_indices(len(result))] += np.concatenate([0 * p[0], tau, multipliers])
     return result
 
 
@@ -235,7 +229,7 @@ def _solve(unit: Inclusion, output: Array, decay: float) -> tuple[float, tuple[A
     for (i, j), value in zip(pairs, x, strict=False):
         p[i, j] = p[j, i] = value
     tau, multipliers = x[len(pairs) : len(pairs) + m], x[len(pairs) + m : -1]
-    smallest = np.linalg.eigvalsh(np.array(inequality(unit, p, tau, multipliers, decay))).min()
+    smallest = np.linalg.eigvalsh(inequality(unit, p, tau, multipliers, decay)).min()
     if not smallest > 0 or not np.linalg.eigvalsh(p).min() > 0:
         return None
     return float(output @ np.linalg.solve(p, output)), (p, tau, multipliers)
@@ -244,26 +238,13 @@ def _solve(unit: Inclusion, output: Array, decay: float) -> tuple[float, tuple[A
 def _condition(unit: Inclusion, pairs: list[tuple[int, int]], decay: float, column: int) -> Array:
     """The part of the inequality that belongs to one variable."""
     n, m, k = len(unit.a), unit.b.shape[1], unit.right.shape[0]
-    whole = np.hstack([unit.a, unit.b, unit.left])
-    matrix = np.zeros((n + m + k,) * 2)
+    p, rest = np.zeros((n, n)), np.zeros(m + k)
     if column < len(pairs):
         i, j = pairs[column]
-        p = np.zeros((n, n))
         p[i, j] = p[j, i] = 1.0
-        if unit.sampled:
-            matrix -= whole.T @ p @ whole
-            matrix[:n, :n] += (1 - decay) * p
-        else:
-            matrix[:n] -= p @ whole
-            matrix[:, :n] -= (p @ whole).T
-            matrix[:n, :n] -= decay * p
-        return matrix
-    place = column - len(pairs)
-    matrix[n + place, n + place] = 1.0
-    if place >= m:
-        row = unit.right[place - m]
-        matrix[:n, :n] -= np.outer(row, row)
-    return matrix
+    else:
+        rest[column - len(pairs)] = 1.0
+    return inequality(unit, p, rest[:m], rest[m:], decay)
 
 
 def _triangle(matrix: Array) -> Array:
@@ -281,26 +262,24 @@ def prove(inclusion: Inclusion, found: Quadratic) -> Fraction | None:
         does not hold.
     """
 
-    def exact(value: float) -> Fraction:
-        return Fraction(f"{value:.{DIGITS - 1}e}")
+    def exact(values: Array) -> Any:
+        return np.vectorize(Fraction, otypes=[object])(values)
 
-    def table(matrix: Array) -> list[list[Fraction]]:
-        return [[Fraction(float(v)) for v in row] for row in matrix]
+    def short(values: Array) -> Any:
+        return np.vectorize(lambda v: Fraction(f"{v:.{DIGITS - 1}e}"), otypes=[object])(values)
 
-    n = len(found.p)
-    p = [[exact(found.p[min(i, j), max(i, j)]) for j in range(n)] for i in range(n)]
-    tau, multipliers = [exact(v) for v in found.tau], [exact(v) for v in found.multipliers]
-    decay, zero = exact(found.decay), Fraction(0)
+    p = short(np.triu(found.p) + np.triu(found.p, 1).T)
+    tau, multipliers, decay = short(found.tau), short(found.multipliers), short(np.array([found.decay]))[0]
+    if not (decay > 0 and min([*tau, *multipliers], default=Fraction(0)) >= 0 and positive_definite(p.tolist())):
+        return None
     plain = Inclusion(
-        a=table(inclusion.a), b=table(inclusion.b), left=table(inclusion.left), right=table(inclusion.right),  # type: ignore[arg-type]
+        a=exact(inclusion.a), b=exact(inclusion.b), left=exact(inclusion.left), right=exact(inclusion.right),
         sampled=inclusion.sampled,
     )  # fmt: skip
-    if not (decay > 0 and min([*tau, *multipliers], default=zero) >= 0 and positive_definite(p)):
+    if not positive_definite(inequality(plain, p, tau, multipliers, decay).tolist()):
         return None
-    if not positive_definite(inequality(plain, p, tau, multipliers, decay, zero=zero)):
-        return None
-    level = sum(tau, zero) / decay
+    level = sum(tau) / decay
     bound = Fraction(f"{found.bound**2 * (1 + 1e-6):.{DIGITS}e}") * max(level, Fraction(1))
-    c = [Fraction(float(v)) for v in found.output]
-    corner = [[*(level_p for level_p in row), c[i]] for i, row in enumerate(p)] + [[*c, bound / level]]
-    return bound if positive_definite(corner) else None
+    c = exact(found.output)
+    corner = np.block([[p, c[:, None]], [c[None, :], np.array([[bound / level]], dtype=object)]])
+    return bound if positive_definite(corner.tolist()) else None
