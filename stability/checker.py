@@ -935,24 +935,34 @@ class Deviation(Loop):
 Matrix = list[list[Fraction]]
 
 
+def dot(row: Iterable[Fraction], column: Iterable[Fraction]) -> Fraction:
+    """Sum of products; most matrices here are sparse."""
+    return sum((a * b for a, b in zip(row, column, strict=True) if a and b), Fraction(0))
+
+
 def product_of(*factors: Matrix) -> Matrix:
     """Matrix product."""
     result = factors[0]
     for factor in factors[1:]:
         columns = list(zip(*factor, strict=True))
-        result = [[sum(map(times_, row, column), Fraction(0)) for column in columns] for row in result]
+        result = [[dot(row, column) for column in columns] for row in result]
     return result
+
+
+def identity(count: int) -> Matrix:
+    """Unit matrix."""
+    return [[Fraction(int(i == j)) for j in range(count)] for i in range(count)]
+
+
+def negative(matrix: Matrix) -> Matrix:
+    """Entries with the other sign."""
+    return [[-value for value in row] for row in matrix]
 
 
 def sum_of(*matrices: Matrix) -> Matrix:
     """Matrix sum."""
     pairs = zip(*matrices, strict=True)
     return [[sum(values, Fraction(0)) for values in zip(*rows, strict=True)] for rows in pairs]
-
-
-def times_(a: Fraction, b: Fraction) -> Fraction:
-    """Product of two numbers, with the zeros of sparse matrices taken out."""
-    return a * b if a and b else Fraction(0)
 
 
 def absolute(matrix: Matrix) -> Matrix:
@@ -963,7 +973,7 @@ def absolute(matrix: Matrix) -> Matrix:
 def inverse_of(matrix: Matrix) -> Matrix:
     """Exact inverse by Gauss-Jordan elimination."""
     n = len(matrix)
-    work = [[*row, *(Fraction(int(i == j)) for j in range(n))] for i, row in enumerate(matrix)]
+    work = [[*row, *unit] for row, unit in zip(matrix, identity(n), strict=True)]
     for i in range(n):
         pivot = next((k for k in range(i, n) if work[k][i] != 0), None)
         if pivot is None:
@@ -998,10 +1008,11 @@ def exponential_times(matrix: Matrix, columns: Matrix) -> Matrix:
     return [[Fraction(v, 1 << FIXED) for v in row] for row in total]
 
 
-def middle_and_spread(a: Interval) -> Interval:
-    """Middle, and distance of the ends from it."""
-    middle = down((a[0] + a[1]) / 2)
-    return middle, max(a[1] - middle, middle - a[0])
+def middle_and_spread(bounds: Interval, factor: Fraction) -> tuple[Fraction, Fraction]:
+    """Middle of an interval times a positive factor, and distance of the ends from it."""
+    low, high = down(bounds[0] * factor), up(bounds[1] * factor)
+    middle = down((low + high) / 2)
+    return middle, max(high - middle, middle - low)
 
 
 class Period:
@@ -1018,6 +1029,16 @@ class Period:
         self.back = inverse_of(self.w)
         self._rest()
         self._vertices()
+        self.motion = self._fold(sum_of(self.end[self.n : 2 * self.n], self.end[2 * self.n : 3 * self.n]))
+        self.half_way = [self._half_way(i) for i in range(self.n)]
+
+    def _half_way(self, i: int) -> Fraction:
+        """T/2 sup|z_i'| over the box: how far z_i gets from the nearest sample."""
+        claim, loop = self.claim, self.loop
+        force = sum((magnitude(loop.entry(i, j)) * r for j, r in enumerate(claim.radii)), loop.disturbance[i])
+        for k, held in enumerate(claim.held):
+            force += magnitude(loop.closed[i].get(f"e{k}", ZERO)) * held
+        return claim.period * force / (2 * self.masses[i][0] * claim.radii[i])
 
     def _nominal(self) -> None:
         claim, loop, n, m = self.claim, self.loop, self.n, self.m
@@ -1026,13 +1047,13 @@ class Period:
             up(max(m0 / low - 1, 1 - m0 / high)) for m0, (low, high) in zip(self.mass, self.masses, strict=True)
         ]
         rate = [claim.period / (m0 * r) for m0, r in zip(self.mass, claim.radii, strict=True)]
-        state = [[self._split(loop.entry(i, j), rate[i] * claim.radii[j]) for j in range(n)] for i in range(n)]
+        state = [[middle_and_spread(loop.entry(i, j), rate[i] * claim.radii[j]) for j in range(n)] for i in range(n)]
         entry = [
-            [self._split(loop.closed[i].get(f"e{k}", ZERO), rate[i] * claim.held[k]) for k in range(m)]
+            [middle_and_spread(loop.closed[i].get(f"e{k}", ZERO), rate[i] * claim.held[k]) for k in range(m)]
             for i in range(n)
         ]
         feedback = [
-            [self._split(f, r / claim.held[k]) for f, r in zip(loop.feedback(k), claim.radii, strict=True)]
+            [middle_and_spread(f, r / claim.held[k]) for f, r in zip(loop.feedback(k), claim.radii, strict=True)]
             for k in range(m)
         ]
         (self.a, self.a_spread), (self.b, self.b_spread), (self.k, self.k_spread) = (
@@ -1042,11 +1063,7 @@ class Period:
         self.push = [up(d * r) for d, r in zip(loop.disturbance, rate, strict=True)]
         self.noise = [up(loop.noise_of(k) / claim.held[k]) for k in range(m)]
         self.drift = [up(claim.period * loop.drift(k) / claim.held[k]) for k in range(m)]
-        self.drive = sum_of(self.a, [[-v for v in row] for row in product_of(self.b, self.k)])
-
-    @staticmethod
-    def _split(bounds: Interval, factor: Fraction) -> Interval:
-        return middle_and_spread((down(bounds[0] * factor), up(bounds[1] * factor)))
+        self.drive = sum_of(self.a, negative(product_of(self.b, self.k)))
 
     def _rest(self) -> None:
         """The positive system that bounds what the nominal map leaves out, integrated over a period."""
@@ -1097,18 +1114,16 @@ class Period:
         parts += (([row[2 * n : -1] for row in block], self.control),)
         moving = sum_of(*(product_of(*p) for p in parts))
         # the noise adds to the held input, and so to the speed at the start of a period
-        known = [sum(map(times_, map(abs, row), self.noise), Fraction(0)) for row in self.b]
-        push = [sum(map(times_, row[n:-1], known + self.noise), row[-1]) for row in block]
-        return moving, push
+        known = [dot(map(abs, row), self.noise) for row in self.b]
+        return moving, [dot(row[n:-1], known + self.noise) + row[-1] for row in block]
 
     def _vertices(self) -> None:
         n, m, w, back = self.n, self.m, self.w, self.back
-        unit = [[Fraction(int(i == j)) for j in range(n + m)] for i in range(n + m)]
         whole = [[*a, *b] for a, b in zip(self.a, self.b, strict=True)] + [[Fraction(0)] * (n + m)] * m
-        flow = exponential_times(whole, unit)
+        flow = exponential_times(whole, identity(n + m))
         held = [row[n:] for row in flow[:n]]
         entry = product_of(held, self.k)
-        closed = sum_of([row[:n] for row in flow[:n]], [[-v for v in row] for row in entry])
+        closed = sum_of([row[:n] for row in flow[:n]], negative(entry))
         self.control = sum_of(absolute(product_of(self.k, back)), product_of(self.k_spread, absolute(back)))
         self.speed = absolute(product_of(self.drive, back))
         effects = {i: product_of(w, self._effect(i)) for i in range(n) if self.change[i] > 0}
@@ -1149,15 +1164,14 @@ class Period:
         n = self.n
         block = [[*row, *([Fraction(0)] * n)] for row in self.a] + [[*([Fraction(0)] * n), *row] for row in self.a]
         block[i][n + i] = Fraction(1)
-        unit = [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
-        return exponential_times(block, [[Fraction(0)] * n] * n + unit)[:n]
+        return exponential_times(block, [[Fraction(0)] * n] * n + identity(n))[:n]
 
     def image(self, bound: list[Fraction], push: bool = True) -> list[Fraction]:
         """The largest A |y| + b over the vertices, for |y| <= bound; without b where `push` is false."""
         values = []
         for moving, shift in self.vertices:
-            step = [sum(map(times_, row, bound), Fraction(0)) for row in moving]
-            values.append([v + s if push else v for v, s in zip(step, shift, strict=True)])
+            step = [dot(row, bound) for row in moving]
+            values.append([v + s for v, s in zip(step, shift, strict=True)] if push else step)
         return [max(column) for column in zip(*values, strict=True)]
 
     def initial(self) -> list[Fraction]:
@@ -1175,22 +1189,17 @@ class Period:
 
     def states(self, bound: list[Fraction]) -> list[Fraction]:
         """Bounds on |z(t)| for all t, between samples too, in units of the box, for |y| <= bound at the samples."""
-        n, claim, loop = self.n, self.claim, self.loop
-        moving, push = self._fold(sum_of(self.end[n : 2 * n], self.end[2 * n : 3 * n]))
+        moving, push = self.motion
         found = []
-        for i in range(n):
-            at = sum(map(times_, map(abs, self.back[i]), bound), Fraction(0))
-            moved = sum(map(times_, moving[i], bound), Fraction(0)) + push[i]
-            force = sum((magnitude(loop.entry(i, j)) * r for j, r in enumerate(claim.radii)), loop.disturbance[i])
-            for k, held in enumerate(claim.held):
-                force += magnitude(loop.closed[i].get(f"e{k}", ZERO)) * held
-            found.append(up(at + min(moved, claim.period * force / (2 * self.masses[i][0] * claim.radii[i]))))
+        for i in range(self.n):
+            moved = min(dot(moving[i], bound) + push[i], self.half_way[i])
+            found.append(up(dot(map(abs, self.back[i]), bound) + moved))
         return found
 
     def inputs(self, bound: list[Fraction]) -> list[Fraction]:
         """Bounds on |u - m|, noise and drift included, in units of the box."""
         rows = zip(self.control, self.noise, self.drift, strict=True)
-        return [sum(map(times_, row, bound), noise + drift) for row, noise, drift in rows]
+        return [dot(row, bound) + noise + drift for row, noise, drift in rows]
 
 
 # --- the obligations ----------------------------------------------------------------------------------------------
@@ -1396,18 +1405,22 @@ def judge(claim: Claim, inflate: Fraction) -> tuple[Loop, Composed | Held]:
     return loop, Composed(claim, loop)
 
 
-def holds(claim: Claim, inflate: Fraction) -> bool:
-    """All obligations that depend on the gains, for every gain within a relative distance."""
+def holds(claim: Claim, loop: Loop, verdict: Composed | Held) -> bool:
+    """All obligations that depend on the gains."""
+    return (
+        verdict.contracts()
+        and verdict.invariance() > 0
+        and all(slack > 0 for slack, _, _ in authority(claim, loop))
+        and verdict.sampling()[1] > 0
+        and adaptation(claim, loop) >= 0
+        and verdict.ball(0) <= claim.accuracy
+    )
+
+
+def holds_within(claim: Claim, inflate: Fraction) -> bool:
+    """The same for every gain within a relative distance."""
     try:
-        loop, verdict = judge(claim, inflate)
-        return (
-            verdict.contracts()
-            and verdict.invariance() > 0
-            and all(slack > 0 for slack, _, _ in authority(claim, loop))
-            and verdict.sampling()[1] > 0
-            and adaptation(claim, loop) >= 0
-            and verdict.ball(0) <= claim.accuracy
-        )
+        return holds(claim, *judge(claim, inflate))
     except NotProvedError:
         return False
 
@@ -1480,9 +1493,10 @@ def obligations(claim: Claim) -> list[Obligation]:
     statement = "sampled adaptation keeps theta >= 0, and delta sigma >= mu where theta is in V"
     faster = max(float(g.delta[1] * g.sigma[1]) for g in loop.gain.values())
     state("adaptation", statement, adaptation(claim, loop), "1", f"a rate of at least {faster:.4g} Hz", False)
-    steps = [step for step in (Fraction(1, 1000), Fraction(1, 10000), ROUNDING) if holds(claim, step)]
+    least = ROUNDING if holds(claim, loop, verdict) else Fraction(-1)
+    wider = (step for step in (Fraction(1, 1000), Fraction(1, 10000)) if holds_within(claim, step))
     statement = "everything holds for the gains as decimal, float64 and float32"
-    state("rounding", statement, (steps or [Fraction(-1)])[0], "1", "what the other obligations need")
+    state("rounding", statement, next(wider, least), "1", "what the other obligations need")
     error = verdict.ball(0)
     statement = f"from {float(claim.transient):g} s on the tracking error is at most {float(error) * 1e3:.4g} mm"
     needed = f"a requirement of {float(error) * 1.0001e3:.4g} mm"
