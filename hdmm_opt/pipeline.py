@@ -15,7 +15,7 @@ from stability import Failure, Gains, checker
 from . import gain_file, validation
 from .errors import DefectError
 from .problem import KINDS, Problem, assemble
-from .proof import Verdict, certificate, compared, diagnose, longest_period, violation
+from .proof import Verdict, candidates, compared, diagnose, longest_period, strongest, violation
 from .selection import Options, Progress, search, starting_point
 from .study import Study
 
@@ -71,7 +71,8 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
         progress.stage("gains: JAYA")
         gains, evaluations = search(problem, chosen.gains, budget, seed, options, progress)
     progress.stage("proof")
-    found = certificate(problem, gains, thorough=True)
+    tried = candidates(problem, gains)
+    found = strongest(problem, gains, tried)
     if isinstance(found, Failure) or violation(problem, found, gains) > 0:
         return _refused(problem, gains)
     progress.stage("validation")
@@ -91,7 +92,7 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
     accepted = report.status == 0 and not shown.missed
     return Design(
         document=finished if accepted else None, report=report, verdicts=verdicts, missed=shown.missed, gains=gains,
-        notes=(compared(problem, gains, found), _rates(problem, gains)) if accepted else (),
+        notes=(compared(problem, gains, tried, found), _rates(problem, gains)) if accepted else (),
     )  # fmt: skip
 
 

@@ -61,24 +61,45 @@ class Verdict:
     witness: dict[str, Any] | None = None
 
 
-def certificate(
-    problem: Problem, gains: tuple[Gains, ...], *, period: float | None = None, thorough: bool = False
-) -> Certificate | Failure:
+def certificate(problem: Problem, gains: tuple[Gains, ...], *, period: float | None = None) -> Certificate | Failure:
     """Search a certificate at the study's control period, or at another one (0: a continuous law).
 
-    The sampled certificate comes first. The composition is looked for where there is none, for a continuous law, and
-    where `thorough` asks for both; the one with the smaller bound among those that meet the limits is returned.
+    The sampled certificate comes first; the composition is looked for where there is none, and for a continuous law.
     """
     bounds = problem.bounds if period is None else replace(problem.bounds, period=period)
     if bounds.period == 0:
         return composition(problem, bounds, gains)
     sampled = certify_sampled(problem.model, bounds, gains, problem.box)
-    if isinstance(sampled, Certificate) and not thorough:
-        return sampled
-    found: list[Certificate | Failure] = [sampled, composition(problem, bounds, gains)]
     if isinstance(sampled, Certificate):
-        found.append(certify_sampled(problem.model, bounds, gains, problem.box, refine=True))
-    return min(found, key=lambda c: _rank(problem, c, gains))
+        return sampled
+    return min((sampled, composition(problem, bounds, gains)), key=lambda c: _rank(problem, c, gains))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidates:
+    """The certificates of some gains at the study's control period, the best of each kind.
+
+    Attributes:
+        sampled: The better of the plain and the refined sampled certificate.
+        composed: The composition.
+    """
+
+    sampled: Certificate | Failure
+    composed: Composition | Failure
+
+
+def candidates(problem: Problem, gains: tuple[Gains, ...]) -> Candidates:
+    """Search all kinds of certificates that a gain file can carry."""
+    found = certify_sampled(problem.model, problem.bounds, gains, problem.box)
+    if isinstance(found, Certificate):
+        refined = certify_sampled(problem.model, problem.bounds, gains, problem.box, refine=True)
+        found = min((found, refined), key=lambda c: _rank(problem, c, gains))
+    return Candidates(sampled=found, composed=composition(problem, problem.bounds, gains))
+
+
+def strongest(problem: Problem, gains: tuple[Gains, ...], found: Candidates) -> Certificate | Failure:
+    """The one with the smaller bound among those that meet the limits."""
+    return min((found.sampled, found.composed), key=lambda c: _rank(problem, c, gains))
 
 
 def composition(problem: Problem, bounds: Bounds, gains: tuple[Gains, ...]) -> Composition | Failure:
@@ -94,18 +115,14 @@ def _rank(problem: Problem, found: Certificate | Failure, gains: tuple[Gains, ..
     return (violation(problem, found, gains), math.inf if isinstance(found, Failure) else float(found.ball[0]))
 
 
-def compared(problem: Problem, gains: tuple[Gains, ...], found: Certificate) -> str:
-    """Which certificate was taken, and what the other kinds would have given."""
-    others: dict[str, str] = {}
-    if isinstance(found, Composition):
-        name = "composition"
-        others["sampled"] = _told(certify_sampled(problem.model, problem.bounds, gains, problem.box))
-    else:
-        name = "sampled"
-        others["composition"] = _told(composition(problem, problem.bounds, gains))
-        others["quadratic, at the samples"] = quadratic_bound(problem, gains, found)
-    text = ", ".join(f"{key}: {value}" for key, value in others.items())
-    return f"{name} certificate, {_told(found)} ({text})"
+def compared(problem: Problem, gains: tuple[Gains, ...], found: Candidates, taken: Certificate) -> str:
+    """Which certificate was taken, and what the other kinds give."""
+    if isinstance(taken, Composition):
+        return f"composition certificate, {_told(taken)} (sampled: {_told(found.sampled)})"
+    others = (
+        f"composition: {_told(found.composed)}, quadratic, at the samples: {quadratic_bound(problem, gains, taken)}"
+    )
+    return f"sampled certificate, {_told(taken)} ({others})"
 
 
 def _told(found: Certificate | Failure) -> str:

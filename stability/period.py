@@ -139,11 +139,12 @@ def comparison(rows: DeviationRows, period: float, transform: Array) -> Map:
     size, back = np.abs(transform), np.abs(inverse)
     control = np.abs(at.k @ inverse) + at.k_spread @ back
 
+    speed, known = np.abs(drive @ inverse), np.abs(at.b) @ rows.noise
+
     def fold(block: Array) -> tuple[Array, Array]:
-        moving = block[:, :n] @ back + block[:, n : 2 * n] @ np.abs(drive @ inverse) + block[:, 2 * n : -1] @ control
-        return moving, block[:, n : 2 * n] @ (np.abs(at.b) @ rows.noise) + block[:, 2 * n : -1] @ rows.noise + block[
-            :, -1
-        ]
+        here, quick, inputs = block[:, :n], block[:, n : 2 * n], block[:, 2 * n : -1]
+        moving = here @ back + quick @ speed + inputs @ control
+        return moving, quick @ known + inputs @ rows.noise + block[:, -1]
 
     shares = [tuple(size @ part for part in fold(rest.share(i))) for i in range(n)]
     base = transform @ closed @ inverse

@@ -149,26 +149,29 @@ class _Search:
             needed = np.max([entry.needed for entry in solved], axis=0)
             inputs = np.max([entry.inputs for entry in solved], axis=0)
             if (needed * ROOM <= radii).all() and (inputs * ROOM <= held).all():
-                ways = [self._approach(entry.image, entry.reach, entry.start) for entry in solved]
-                decay = min(rate for _, rate in ways)
-                cells = tuple(
-                    Cell(transform=entry.transform, reach=entry.reach, start=entry.start, shape=shape)
-                    for entry, (shape, _) in zip(solved, ways, strict=True)
-                )
-                ball = np.max(
-                    [self._ball(*pair, decay, radii, held) for pair in zip(solved, cells, strict=True)], axis=0
-                )
-                return Sampled(
-                    decay=decay, radii=radii, held=held, ball=np.minimum(ball, radii),
-                    effort=rows.feedforward + held, states=rows.states, split=split,
-                    cells=cells,
-                )  # fmt: skip
+                return self._certificate(rows, split, solved, radii, held)
             if (needed > self.limit).any():
                 worst = int(np.argmax(needed / self.limit))
                 return Failure(reason="the certified set outgrows the operating box", row=worst)
             radii = np.where(needed * ROOM <= radii, radii, needed * WIDENING)
             held = np.where(inputs * ROOM <= held, held, inputs * WIDENING)
         return Failure(reason=f"the box did not settle in {self.STEPS} iterations", row=n - 1)
+
+    def _certificate(
+        self, rows: DeviationRows, split: tuple[int, ...], solved: list[_Bounds], radii: Array, held: Array
+    ) -> Sampled:
+        """What the cells certify over a box that holds what they need."""
+        ways = [self._approach(entry.image, entry.reach, entry.start) for entry in solved]
+        decay = min(rate for _, rate in ways)
+        cells = tuple(
+            Cell(transform=entry.transform, reach=entry.reach, start=entry.start, shape=shape)
+            for entry, (shape, _) in zip(solved, ways, strict=True)
+        )
+        ball = np.max([self._ball(*pair, decay, radii, held) for pair in zip(solved, cells, strict=True)], axis=0)
+        return Sampled(
+            decay=decay, radii=radii, held=held, ball=np.minimum(ball, radii), effort=rows.feedforward + held,
+            states=rows.states, split=split, cells=cells,
+        )  # fmt: skip
 
     def _cell(self, rows: DeviationRows, transform: Array, radii: Array, held: Array) -> _Bounds | Failure:
         n = len(radii)

@@ -96,13 +96,13 @@ def test_writing_is_whole_or_not_at_all(tmp_path, monkeypatch):
 
 def test_a_simulation_outside_its_envelope_stops_everything(monkeypatch):
     """A certificate that claims a hundredth of the true box: simulation contradicts it, and that is said."""
-    real = pipeline.certificate
+    real = pipeline.strongest
 
-    def too_sure(problem, gains, **options):
-        found = real(problem, gains, **options)
+    def too_sure(problem, gains, tried):
+        found = real(problem, gains, tried)
         return replace(found, radii=0.01 * found.radii)
 
-    monkeypatch.setattr(pipeline, "certificate", too_sure)
+    monkeypatch.setattr(pipeline, "strongest", too_sure)
     loaded = study.load("emla-p2")
     fixed = {
         name: {"value": value}
