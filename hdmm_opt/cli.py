@@ -70,11 +70,17 @@ def studies(as_json: bool) -> None:
 @click.argument("study")
 @click.option("-o", "output", type=click.Path(path_type=Path), help="Gain file to write; STUDY.gains.json by default.")
 @click.option("--report", type=click.Path(path_type=Path, file_okay=False), help="Folder for an HTML report.")
-@click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Processes for the search.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(1, 256),
+    default=1,
+    show_default=True,
+    help="Processes for the search, threads for the runs.",
+)
 @click.option("--seed", type=click.IntRange(0), help="Seed of the search; that of the study by default.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted search.")
 @click.option("--budget", type=click.Choice(["quick", "full"]), default="quick", show_default=True,
-              help="quick: as the study says; full: population 50, 100 iterations, 1000 Monte Carlo runs.")  # fmt: skip
+              help="quick: as the study says; full: 50 x 100 candidates, 1000 random runs, 10000 attacks.")  # fmt: skip
 def design(
     study: str, output: Path | None, report: Path | None, jobs: int, seed: int | None, resume: bool, budget: str
 ) -> None:
@@ -111,11 +117,13 @@ def simulate(file: Path, scenario: str | None, csv_path: Path | None, as_json: b
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--budget", type=click.IntRange(1), default=300, show_default=True, help="Number of simulated runs.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the search.")
-def falsify(file: Path, budget: int, seed: int) -> None:
+@click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Threads for the runs.")
+@click.option("--resume", is_flag=True, help="Go on with an interrupted search.")
+def falsify(file: Path, budget: int, seed: int, jobs: int, resume: bool) -> None:
     """Search the worst load, parameters and start inside the assumptions of FILE, and keep the worst in it."""
     from .commands import run_falsify
 
-    sys.exit(run_falsify(file, budget, seed))
+    sys.exit(run_falsify(file, budget, seed, jobs=jobs, resume=resume))
 
 
 @main.command()

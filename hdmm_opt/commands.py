@@ -23,7 +23,8 @@ from .gain_file import gains_of, reference_of
 from .problem import Problem, assemble, study_of
 from .progress import bar
 from .selection import Options
-from .simulation import ClosedLoop, Metrics, Scenario, Trace, scenarios
+from .simulation import ClosedLoop, Fault, Metrics, Run, Scenario, Trace, scenarios
+from .state import State
 
 
 def run_design(
@@ -42,15 +43,16 @@ def run_design(
     options = Options(seed=seed, jobs=jobs, full=full, state=state, resume=resume)
     with bar() as progress:
         result = pipeline.design(chosen, options, progress)
-    state.unlink(missing_ok=True)
     if result.document is None:
         write_text(rejected, gain_file.to_text(pipeline.rejected_document(chosen, result)))
+        state.unlink(missing_ok=True)
         _explain(chosen.study.name, result, rejected)
         if target.exists():
             click.echo(f"  {target} is from an earlier run, not of this design; it was left as it is", err=True)
         return NOT_PROVED
     write_text(target, gain_file.to_text(result.document))
     rejected.unlink(missing_ok=True)
+    state.unlink(missing_ok=True)
     _summary(result)
     if report is not None:
         from .report import write_report
@@ -123,10 +125,9 @@ def run_simulate(path: Path, name: str | None, csv_path: Path | None, as_json: b
     results: dict[str, Metrics] = {}
     for key in chosen:
         loop, scenario = offered[key]
-        trace = loop.run(gains, problem.reference, scenario)
-        results[key] = validation.figures(problem, trace)
+        (results[key],) = loop.figures([Run(gains=gains, scenario=scenario)], problem.reference)
         if csv_path is not None:
-            write_text(csv_path, _csv(problem, trace))
+            write_text(csv_path, _csv(problem, loop.run(gains, problem.reference, scenario)))
     if as_json:
         click.echo(json.dumps({key: asdict(metrics) for key, metrics in results.items()}, indent=1))
     else:
@@ -150,13 +151,16 @@ def _from_file(path: Path) -> tuple[Problem, tuple[Any, ...], dict[str, tuple[Cl
         offered["worst-case"] = (problem.loop, _scenario(worst["scenario"]))
     for entry in document["obligations"]:
         if entry.get("witness"):
-            loop = replace(problem.loop, period=1 / float(entry["witness"]["rate_hz"]), _compiled={})
+            loop = replace(problem.loop, period=1 / float(entry["witness"]["rate_hz"]))
             offered["witness"] = (loop, _scenario(entry["witness"]["scenario"]))
     return problem, gains_of(document), offered
 
 
 def _scenario(data: dict[str, Any]) -> Scenario:
-    return Scenario(**{**data, "load": tuple((float(t), float(f)) for t, f in data["load"])})
+    fault = data.get("fault")
+    if fault is not None:
+        fault = Fault(**{**fault, "stuck": tuple(fault["stuck"])})
+    return Scenario(**{**data, "load": tuple((float(t), float(f)) for t, f in data["load"]), "fault": fault})
 
 
 def _csv(problem: Problem, trace: Trace) -> str:
@@ -175,34 +179,32 @@ def _csv(problem: Problem, trace: Trace) -> str:
     return text.getvalue()
 
 
-def run_falsify(path: Path, budget: int, seed: int) -> int:
+def run_falsify(path: Path, budget: int, seed: int, *, jobs: int = 1, resume: bool = False) -> int:
     """`hdmm-opt falsify`."""
-    from .falsification import falsify, stored
+    from .falsification import ball_of, contradiction, falsify, stored
 
     report = checker.check_file(path)
     if report.status != PROVED:
         raise InvalidInputError(f"{path}: {report.message}; only a proved file can be attacked")
     document = gain_file.read(path)
     problem, gains, offered = _from_file(path)
+    job = {"falsify": document["sha256"], "budget": budget, "seed": seed}
+    state = State(path.with_name(f".{path.name}.falsify.state"), job, resume=resume)
     with bar() as progress:
         progress.stage("falsify")
         known = [scenario for _, scenario in offered.values()]
-        found = falsify(problem, gains, known, budget, seed, progress.update)
-    radius = float(Fraction(document["certificate"]["radii"][0]))
-    ball = float(Fraction(document["certificate"]["envelope"]["ball"][0]))
-    late = found.metrics.maximum_error_m
-    if not found.largest_use < 1 - 1e-9:
-        raise DefectError(
-            f"a run used {found.largest_use:.6g} of a limit that is proved; please report this file with seed {seed}"
-        )
-    if not (found.largest_error <= radius and late <= ball):
-        text = json.dumps(asdict(found.scenario))
-        raise DefectError(f"a run reached {late:.6g} m, certified {ball:.6g} m; please report this scenario: {text}")
-    finished, verdict = gain_file.prove(stored(document, found, ball))
+        found = falsify(problem, gains, known, budget, seed, progress.update, jobs=jobs, state=state)
+    broken = contradiction(document, found)
+    if broken is not None:
+        raise DefectError(f"{broken}; please report this file with seed {seed}")
+    finished, verdict = gain_file.prove(stored(document, found))
     if verdict.status != PROVED:
         raise DefectError(f"the file is no longer proved with its witness: {verdict.message}")
+    # in this order: a file that is attacked already must not be attacked again by a resumed run
+    state.remove()
     write_text(path, gain_file.to_text(finished))
     click.echo(f"{found.runs} runs, none outside the certified envelope (that proves nothing more)", err=True)
+    late, ball = found.metrics.maximum_error_m, ball_of(document)
     worst = finished["validation"]["largest_error_after_transient_m"]
     click.echo(
         f"worst {1e3 * late:.4g} mm, worst on record {1e3 * worst:.4g} mm, certified {1e3 * ball:.4g} mm: "

@@ -6,9 +6,11 @@ distance between its worst find and the certified bound is the price of the proo
 
 from __future__ import annotations
 
+import json
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from fractions import Fraction
 from functools import partial
 from typing import Any
 
@@ -18,13 +20,15 @@ from numpy.typing import NDArray
 from stability import Gains
 
 from .problem import Problem
-from .simulation import Metrics, Scenario, Trace
-from .validation import figures
+from .simulation import Metrics, Run, Scenario
+from .state import State
 
 Array = NDArray[np.float64]
 
 #: Share of the budget that the structured seeds may use; CMA-ES has the rest.
 STRUCTURED = 0.4
+#: Population of CMA-ES below and from `LARGE_BUDGET` runs on; the large one fills two groups of lanes.
+SMALL, LARGE, LARGE_BUDGET = 8, 64, 1000
 #: Switching times in the load that CMA-ES moves.
 SWITCHES = 6
 #: Half periods of the bang-bang loads among the seeds, s.
@@ -54,17 +58,19 @@ class Witness:
 
 def falsify(
     problem: Problem, gains: tuple[Gains, ...], known: Sequence[Scenario], budget: int, seed: int,
-    progress: Callable[[float, str], None],
+    progress: Callable[[float, str], None], *, jobs: int = 1, state: State | None = None,
 ) -> Witness:  # fmt: skip
     """Search the largest tracking error after the transient.
 
     Args:
         problem: The study's problem.
         gains: Gains to attack.
-        known: Scenarios to begin with, such as the worst ones on record.
+        known: Scenarios to begin with, such as the worst ones on record; those with a fault are left out.
         budget: Number of simulated runs.
         seed: Seed of the search.
         progress: Called with the share done and the worst so far.
+        jobs: Threads.
+        state: Keeps the errors of the runs, so that an interrupted search can go on.
 
     Returns:
         The worst run: constant, stepped, ramped, sinusoidal and bang-bang loads at the corners of the parameters first,
@@ -72,58 +78,74 @@ def falsify(
 
     Not guaranteed: that it is the worst case.
     """
-    attack = _Attack(problem, gains, budget, seed, progress)
-    for scenario in list(known)[:budget]:
-        attack.error(scenario)
+    attack = _Attack(
+        problem, gains, budget, seed, jobs, progress, State(None, {}, resume=False) if state is None else state
+    )
+    attack.errors([scenario for scenario in known if scenario.covered][:budget])
     attack.structured()
     attack.evolve()
     assert attack.worst is not None
+    (metrics,) = problem.loop.figures([Run(gains=gains, scenario=attack.worst[0])], problem.reference)
     return Witness(
-        scenario=attack.worst[0], metrics=attack.worst[1], largest_error=attack.largest, largest_use=attack.use,
+        scenario=attack.worst[0], metrics=metrics, largest_error=attack.largest, largest_use=attack.use,
         runs=attack.runs,
     )  # fmt: skip
 
 
 class _Attack:
-    """Counts runs and keeps the worst."""
+    """Counts runs and keeps the worst.
+
+    The search is a function of its seed and of the errors that it sees, so the errors are all that is kept: a search
+    that goes on repeats its questions and has the first answers at hand.
+    """
 
     def __init__(
-        self, problem: Problem, gains: tuple[Gains, ...], budget: int, seed: int, progress: Callable[[float, str], None]
-    ) -> None:
-        self.problem, self.gains, self.budget, self.seed, self.progress = problem, gains, budget, seed, progress
+        self, problem: Problem, gains: tuple[Gains, ...], budget: int, seed: int, jobs: int,
+        progress: Callable[[float, str], None], state: State,
+    ) -> None:  # fmt: skip
+        self.problem, self.gains, self.budget, self.seed = problem, gains, budget, seed
+        self.jobs, self.progress, self.state = jobs, progress, state
         self.names = [name for name, p in problem.plant.parameters.items() if p.tolerance > 0]
         self.low, self.high = problem.study.uncertainty.load_force_n
         self.end = problem.reference.duration
         self.runs, self.largest, self.use = 0, 0.0, 0.0
-        self.worst: tuple[Scenario, Metrics] | None = None
+        self.worst: tuple[Scenario, float] | None = None
+        self.answers: list[list[list[float]]] = list(state.get("falsify") or [])
+        self.asked = 0
 
-    def error(self, scenario: Scenario) -> float:
-        """Run a scenario; its largest error after the transient."""
-        trace = self.problem.loop.run(self.gains, self.problem.reference, scenario)
-        metrics = figures(self.problem, trace)
-        self.runs += 1
-        self.largest = max(self.largest, np.inf if trace.diverged else float(np.abs(trace.error).max()))
-        self.use = max(self.use, limit_use(self.problem, trace))
-        if self.worst is None or metrics.maximum_error_m > self.worst[1].maximum_error_m:
-            self.worst = (scenario, metrics)
-        self.progress(self.runs / self.budget, f"worst {1e3 * self.worst[1].maximum_error_m:.4g} mm")
-        return metrics.maximum_error_m
+    def errors(self, tried: Sequence[Scenario]) -> list[float]:
+        """Run scenarios together; their largest errors after the transient."""
+        if self.asked == len(self.answers):
+            runs = [Run(gains=self.gains, scenario=scenario) for scenario in tried]
+            found = self.problem.loop.figures(runs, self.problem.reference, jobs=self.jobs)
+            self.answers.append([[m.maximum_error_m, m.largest_error_m, m.limit_use] for m in found])
+            self.state.put("falsify", self.answers, often=True)
+        answers = self.answers[self.asked]
+        self.asked += 1
+        for scenario, (late, largest, use) in zip(tried, answers, strict=True):
+            self.largest, self.use = max(self.largest, largest), max(self.use, use)
+            if self.worst is None or late > self.worst[1]:
+                self.worst = (scenario, late)
+        self.runs += len(tried)
+        if self.worst is not None:
+            self.progress(self.runs / self.budget, f"worst {1e3 * self.worst[1]:.4g} mm")
+        return [late for late, _, _ in answers]
 
     def structured(self) -> None:
         """Loads of simple shapes, then the sign of each parameter by its own effect, then all together."""
         limit = max(2, int(STRUCTURED * self.budget))
         make = partial(Scenario, name="falsified", noise=1.0, initial=1.0, seed=self.seed)
-        shapes = self._loads()[: max(1, min(limit - 2 * len(self.names) - 4, self.budget - self.runs))]
-        load = max(shapes, key=lambda points: self.error(make(load=points)))
-        signs: dict[str, float] = {}
-        for name in self.names:
-            if self.runs + 2 > limit:
-                break
-            errors = {s: self.error(make(load=load, parameters={name: s})) for s in (1.0, -1.0)}
-            signs[name] = max(errors, key=errors.__getitem__)
-        for initial, bias in ((1.0, 0.0), (-1.0, 0.0), (1.0, 1.0), (1.0, -1.0)):
-            if self.runs < self.budget:
-                self.error(make(load=load, parameters=signs, initial=initial, bias=bias))
+        left = min(limit - 2 * len(self.names) - 4, self.budget - self.runs)
+        shapes = self._loads()[: max(1, left)]
+        errors = self.errors([make(load=points) for points in shapes])
+        load = shapes[int(np.argmax(errors))]
+        names = self.names[: max(0, (limit - self.runs) // 2)]
+        pairs = self.errors([make(load=load, parameters={name: s}) for name in names for s in (1.0, -1.0)])
+        signs = {
+            name: 1.0 if up >= down else -1.0 for name, up, down in zip(names, pairs[::2], pairs[1::2], strict=True)
+        }
+        starts = ((1.0, 0.0), (-1.0, 0.0), (1.0, 1.0), (1.0, -1.0))[: max(0, self.budget - self.runs)]
+        self.errors([make(load=load, parameters=signs, initial=initial, bias=bias) for initial, bias in starts])
 
     def _loads(self) -> list[tuple[tuple[float, float], ...]]:
         low, high, end = self.low, self.high, self.end
@@ -151,11 +173,12 @@ class _Attack:
             signs = [0.5 + 0.45 * found.parameters.get(name, 0.0) for name in self.names]
             start = [0.5 + 0.45 * found.initial, 0.5 + 0.45 * found.bias]
             first = np.array([*signs, *start, *np.linspace(0.1, 0.9, SWITCHES), 0.5])
-            options = {"bounds": [0, 1], "seed": self.seed + 1, "verbose": -9, "maxfevals": left, "popsize": 8}
+            size = SMALL if self.budget < LARGE_BUDGET else LARGE
+            options = {"bounds": [0, 1], "seed": self.seed + 1, "verbose": -9, "maxfevals": left, "popsize": size}
             search = cma.CMAEvolutionStrategy(first, 0.25, options)
-            while self.runs + 8 <= self.budget:
+            while self.runs + size <= self.budget:
                 points = search.ask()
-                search.tell(points, [-self.error(self._scenario(np.asarray(p))) for p in points])
+                search.tell(points, [-e for e in self.errors([self._scenario(np.asarray(p)) for p in points])])
 
     def _scenario(self, point: Array) -> Scenario:
         """A point of the unit cube: parameters, start, bias, switching times, and which load comes first."""
@@ -174,14 +197,6 @@ class _Attack:
         )
 
 
-def limit_use(problem: Problem, trace: Trace) -> float:
-    """The largest share of a limit that a run uses."""
-    plant = problem.plant
-    signals = dict(zip((*plant.states, *plant.inputs), (*trace.x, *trace.u), strict=True))
-    sizes = (np.linalg.norm([signals[s] for s in limit.signals], axis=0).max() / limit.value for limit in plant.limits)
-    return float(max(sizes))
-
-
 def _switched(first: float, second: float, times: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
     """A load that jumps between two values at given times."""
     points: list[tuple[float, float]] = [(0.0, first)]
@@ -193,10 +208,28 @@ def _switched(first: float, second: float, times: tuple[float, ...]) -> tuple[tu
     return tuple(points)
 
 
-def stored(document: dict[str, Any], witness: Witness, ball: float) -> dict[str, Any]:
+def contradiction(document: dict[str, Any], witness: Witness) -> str | None:
+    """What a run did that the certificate of a gain file excludes, as text; None where nothing."""
+    if not witness.largest_use < 1 - 1e-9:
+        return f"a run used {witness.largest_use:.6g} of a limit that is proved"
+    radius, ball = float(Fraction(document["certificate"]["radii"][0])), ball_of(document)
+    late = witness.metrics.maximum_error_m
+    if not (witness.largest_error <= radius and late <= ball):
+        scenario = json.dumps(asdict(witness.scenario))
+        return f"a run reached {late:.6g} m, certified {ball:.6g} m, in scenario {scenario}"
+    return None
+
+
+def ball_of(document: dict[str, Any]) -> float:
+    """The certified bound on the tracking error after the transient, m."""
+    return float(Fraction(document["certificate"]["envelope"]["ball"][0]))
+
+
+def stored(document: dict[str, Any], witness: Witness) -> dict[str, Any]:
     """A gain file's document with the witness as its worst case, where it is worse than the one there."""
     shown = dict(document["validation"])
-    late = witness.metrics.maximum_error_m
+    late, ball = witness.metrics.maximum_error_m, ball_of(document)
+    shown["falsification_runs"] = shown.get("falsification_runs", 0) + witness.runs
     shown["largest_error_m"] = max(shown["largest_error_m"], witness.largest_error)
     if late >= shown["largest_error_after_transient_m"]:
         scenario = {**asdict(witness.scenario), "load": [list(p) for p in witness.scenario.load]}

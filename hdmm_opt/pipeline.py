@@ -6,7 +6,7 @@ import math
 import os
 import platform
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import metadata
 from typing import Any
 
@@ -14,13 +14,33 @@ from stability import Failure, Gains, checker
 
 from . import gain_file, validation
 from .errors import DefectError
-from .problem import KINDS, Problem, assemble
+from .falsification import contradiction, falsify, stored
+from .problem import KINDS, Problem, assemble, resolved
 from .proof import Verdict, candidates, compared, diagnose, longest_period, strongest, violation
 from .selection import Options, Progress, search, starting_point
+from .state import State
 from .study import Study
 
-#: Population, iterations and Monte Carlo runs of `--budget full`.
-FULL = (50, 100, 1000)
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much a design may cost.
+
+    Attributes:
+        population: Candidates of the search.
+        iterations: Evaluations of each after the first.
+        monte_carlo: Runs with random scenarios.
+        falsify: Runs that try to break the proof.
+    """
+
+    population: int
+    iterations: int
+    monte_carlo: int
+    falsify: int
+
+
+#: `--budget full`.
+FULL = Effort(population=50, iterations=100, monte_carlo=1000, falsify=10_000)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,13 +83,17 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
     progress.stage("reference")
     problem = assemble(study)
     seed = study.tuning.seed if options.seed is None else options.seed
+    effort = _effort(study, options)
+    job = {"design": resolved(problem), "seed": seed, "effort": asdict(effort)}
+    state = State(options.state, job, resume=options.resume)
     progress.stage("gains: convex selection")
     chosen = starting_point(problem)
-    gains, evaluations = chosen.gains, chosen.rounds
-    budget = _budget(study, options)
-    if problem.searched and budget[1]:
-        progress.stage("gains: JAYA")
-        gains, evaluations = search(problem, chosen.gains, budget, seed, options, progress)
+    gains, spent = chosen.gains, {"evaluations": chosen.rounds, "search_runs": 0}
+    if problem.searched and effort.iterations:
+        progress.stage(f"gains: {study.tuning.method}")
+        budget = (effort.population, effort.iterations)
+        picked = search(problem, chosen, budget, seed, options, state, progress)
+        gains, spent = picked.gains, {"evaluations": picked.evaluations, "search_runs": picked.runs}
     progress.stage("proof")
     tried = candidates(problem, gains)
     found = strongest(problem, gains, tried)
@@ -77,23 +101,42 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
         return _refused(problem, gains)
     progress.stage("validation")
     shown = validation.validate(
-        problem, gains, seed=seed, monte_carlo=budget[2], progress=lambda part: progress.update(0.0, part)
-    )
+        problem, gains, seed=seed, monte_carlo=effort.monte_carlo, jobs=options.jobs,
+        progress=lambda part: progress.update(0.0, part),
+    )  # fmt: skip
     if not shown.largest_error <= found.radii[0]:
         raise DefectError(
             f"a simulation reached {shown.largest_error:.6g} m, outside the certified {found.radii[0]:.6g} m; "
             "no file was written, please report this study"
         )
-    provenance = _provenance(seed, options, evaluations, begun)
-    document = gain_file.build(problem, gains, found, validation.to_data(problem, shown, found), provenance)
+    data = validation.to_data(problem, shown, found)
+    document = gain_file.build(problem, gains, found, data, {})
+    if effort.falsify:
+        progress.stage("falsification")
+        document = _attacked(problem, gains, document, shown, effort.falsify, seed, options, state, progress)
     progress.stage("exact check")
-    finished, report = gain_file.prove(document)
+    provenance = _provenance(seed, options, spent, begun)
+    finished, report = gain_file.prove({**document, "provenance": provenance})
     verdicts = tuple(_from_checker(report))
     accepted = report.status == 0 and not shown.missed
+    notes = (compared(problem, gains, tried, found), _rates(problem, gains)) if accepted else ()
     return Design(
         document=finished if accepted else None, report=report, verdicts=verdicts, missed=shown.missed, gains=gains,
-        notes=(compared(problem, gains, tried, found), _rates(problem, gains)) if accepted else (),
+        notes=notes,
     )  # fmt: skip
+
+
+def _attacked(
+    problem: Problem, gains: tuple[Gains, ...], document: dict[str, Any], shown: validation.Validation, runs: int,
+    seed: int, options: Options, state: State, progress: Progress,
+) -> dict[str, Any]:  # fmt: skip
+    """The document after a search that tries to break its proof."""
+    known = [s for s, _ in (*shown.runs, *([shown.worst] if shown.worst else []))]
+    witness = falsify(problem, gains, known, runs, seed, progress.update, jobs=options.jobs, state=state)
+    broken = contradiction(document, witness)
+    if broken is not None:
+        raise DefectError(f"{broken}; no file was written, please report this study")
+    return stored(document, witness)
 
 
 def _rates(problem: Problem, gains: tuple[Gains, ...]) -> str:
@@ -101,10 +144,14 @@ def _rates(problem: Problem, gains: tuple[Gains, ...]) -> str:
     return f"certified up to a control period of {longest * 1e3:.4g} ms ({1 / longest:.4g} Hz), not found beyond"
 
 
-def _budget(study: Study, options: Options) -> tuple[int, int, int]:
+def _effort(study: Study, options: Options) -> Effort:
     if options.full:
         return FULL
-    return study.tuning.population, study.tuning.iterations, study.validation.monte_carlo
+    tuning, validation = study.tuning, study.validation
+    return Effort(
+        population=tuning.population, iterations=tuning.iterations, monte_carlo=validation.monte_carlo,
+        falsify=validation.falsify,
+    )  # fmt: skip
 
 
 def _refused(problem: Problem, gains: tuple[Gains, ...]) -> Design:
@@ -150,13 +197,13 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _provenance(seed: int, options: Options, evaluations: int, begun: float) -> dict[str, Any]:
-    packages = ("hdmm-opt", "casadi", "cvxpy", "clarabel", "numpy", "scipy")
+def _provenance(seed: int, options: Options, spent: dict[str, int], begun: float) -> dict[str, Any]:
+    packages = ("hdmm-opt", "casadi", "cvxpy", "clarabel", "llvmlite", "numpy", "scipy")
     return {
         "versions": {"python": platform.python_version(), **{name: _version(name) for name in packages}},
         "seed": seed,
         "budget": "full" if options.full else "quick",
-        "evaluations": evaluations,
+        **spent,
         "wall_time_s": round(time.perf_counter() - begun, 3),
         "threads": options.jobs,
         "cpus": os.cpu_count(),

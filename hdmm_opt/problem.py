@@ -17,7 +17,7 @@ from .control import RAC
 from .errors import InvalidInputError
 from .motion import build_reference
 from .plants import Parameter, Plant, pmsm_emla
-from .simulation import ClosedLoop
+from .simulation import ClosedLoop, Yardstick
 from .study import Study, nearest, validated
 
 Array = NDArray[np.float64]
@@ -134,7 +134,14 @@ def assemble(study: Study, reference: Reference | None = None) -> Problem:
         period=1 / study.controller.rate_hz,
         transient=study.validation.transient_s,
     )
-    loop = ClosedLoop(law=law, period=bounds.period, noise=noise, initial=initial, nominal_load=nominal["load_force"])
+    yardstick = Yardstick(
+        transient=study.validation.transient_s, band=study.requirements.tracking_error_m,
+        transmission=plant.parameters["transmission"].value,
+    )  # fmt: skip
+    loop = ClosedLoop(
+        law=law, period=bounds.period, noise=noise, initial=initial, nominal_load=nominal["load_force"],
+        yardstick=yardstick,
+    )  # fmt: skip
     return Problem(
         study=study, plant=plant, law=law, model=law.loop_model(), reference=reference, bounds=bounds,
         box=_box(plant), ranges=ranges, loop=loop,

@@ -1,8 +1,7 @@
-"""The two stages of the gain selection: convex programs to a proved start, then JAYA over the proved set."""
+"""The two stages of the gain selection: convex programs to a proved start, then a search over the proved set."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,25 +12,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stability import Certificate, Failure, Gains, certify, checker, error_rows
-from tuning import Executor, Outcome, SearchState, Selection, select, start, step
+from stability import Composition, Gains, certify, error_rows
+from tuning import Best, Budget, Outcome, Population, Selection, best_of, executor, select
+from tuning import search as run_search
+from tuning.decimals import rounded, shortest
 
-from . import validation
 from .errors import InvalidInputError
-from .files import write_text
-from .problem import Problem, assemble, resolved
-from .proof import certificate, slacks, violation
-from .simulation import scenarios
-from .study import Study
+from .evaluation import evaluate, make_evaluator
+from .problem import KINDS, Problem
+from .proof import certificate, violation
+from .state import State
 
 Array = NDArray[np.float64]
 
-#: Scenarios of the study that enter the cost of a candidate.
-COST_SCENARIOS = 2
 #: Where the first stage begins: positions of the outer gain in its range, and ratios of successive bandwidths.
 OUTER_SHARES, SEPARATIONS = (0.1, 0.25, 0.4, 0.6), (5.0, 8.0, 12.0)
 #: The first stage aims at this share of the required error, so that the proof keeps room.
 AIM = 0.8
+#: Significant digits that the winner's gains may shrink to, fewest first.
+SHORT_DIGITS = (2, 3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,10 +52,11 @@ class Options:
 
     Attributes:
         seed: Seed of the search; that of the study where None.
-        jobs: Processes for candidates.
+        jobs: Processes for candidates, threads for runs.
         full: The large budget.
-        state: File that keeps the state of the search; None keeps none.
+        state: File that keeps the state of the job; None keeps none.
         resume: Go on from that file.
+        cluster: Address of a Dask scheduler for the candidates, or "local".
     """
 
     seed: int | None = None
@@ -64,6 +64,24 @@ class Options:
     full: bool = False
     state: Path | None = None
     resume: bool = False
+    cluster: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """What a search ends with.
+
+    Attributes:
+        gains: The best gains that were met; proved and inside all limits where `best` says so.
+        best: The outcome of proved gains, or None.
+        evaluations: Candidates evaluated, infeasible ones included.
+        runs: Closed-loop runs.
+    """
+
+    gains: tuple[Gains, ...]
+    best: Best | None
+    evaluations: int
+    runs: int
 
 
 def starting_point(problem: Problem) -> Selection:
@@ -103,93 +121,92 @@ def bandwidth_ladder(problem: Problem) -> list[tuple[Gains, ...]]:
 
 
 def search(
-    problem: Problem, first: tuple[Gains, ...], budget: tuple[int, int, int], seed: int, options: Options,
+    problem: Problem, first: Selection, budget: tuple[int, int], seed: int, options: Options, state: State,
     progress: Progress,
-) -> tuple[tuple[Gains, ...], int]:  # fmt: skip
-    """Stage two: JAYA over the proved set, with the closed-loop cost."""
-    population, iterations, _ = budget
-    key = checker.digest({"study": resolved(problem), "seed": seed, "budget": list(budget)})
-    with Executor(make_evaluator, (problem.study,), options.jobs) as executor:
-        state = _restore(options, key)
-        if state is None:
-            state = start(executor.map, problem.point(first), population, seed)
-            _keep(options, key, state)
-        while state.iteration < iterations:
-            state = step(executor.map, state)
-            _keep(options, key, state)
-            cost = state.outcomes[state.best].cost
-            progress.update(
-                state.iteration / iterations, f"best {cost:.4g}" if math.isfinite(cost) else "none proved yet"
-            )
-    return problem.gains(state.population[state.best]), state.evaluations
+) -> Found:  # fmt: skip
+    """Stage two: the study's method over the proved set, with the closed-loop cost; then fewer digits.
+
+    Args:
+        problem: The study's problem.
+        first: Where stage one ended.
+        budget: Population, and evaluations of each candidate of the population.
+        seed: Seed of the search.
+        options: Workers.
+        state: Keeps the population after each iteration.
+        progress: Where to report.
+    """
+    population, rounds = budget
+    allowed = Budget(evaluations=population * (rounds + 1), seconds=problem.study.tuning.seconds or math.inf)
+    composed = isinstance(first.certificate, Composition)
+
+    def after(now: Population) -> None:
+        state.put("search", _data(now))
+        cost = now.outcomes[now.best].cost
+        progress.update(
+            now.evaluations / allowed.evaluations, f"best {cost:.4g}" if math.isfinite(cost) else "none proved yet"
+        )
+
+    with executor(_make, (problem.study, composed), options.jobs, options.cluster) as workers:
+        found = run_search(
+            problem.study.tuning.method, workers.map, problem.point(first.gains), population, seed, allowed,
+            restored=_population(state), after=after,
+        )  # fmt: skip
+    best, gains = best_of(found), problem.gains(found.points[found.best])
+    if best is None:
+        return Found(gains=gains, best=None, evaluations=found.evaluations, runs=found.runs)
+    choices = [_with_digits(problem, gains, digits) for digits in SHORT_DIGITS]
+    short = shortest(choices, lambda some: evaluate(problem, some, composed=composed), best.outcome)
+    if short is not None:
+        gains = short[0]
+        best = Best(point=problem.point(gains), outcome=short[1])
+    return Found(gains=gains, best=best, evaluations=found.evaluations + len(choices), runs=found.runs)
 
 
-def make_evaluator(study: Study) -> Callable[[Array], Outcome]:
-    """The outcome of a candidate as a pure function; infeasible candidates are never simulated."""
-    problem = assemble(study)
-    runs = scenarios(study)[:COST_SCENARIOS]
-
-    def evaluate(point: Array) -> Outcome:
-        gains = problem.gains(point)
-        found = certificate(problem, gains)
-        excess = violation(problem, found, gains)
-        if excess > 0 or isinstance(found, Failure):
-            return Outcome(violation=max(excess, 1e-12), cost=math.inf)
-        return Outcome(violation=0.0, cost=closed_loop_cost(problem, gains, found, runs))
-
-    return evaluate
+def _make(study: Any, composed: bool) -> Callable[..., list[Outcome]]:
+    return make_evaluator(study, composed=composed)
 
 
-def closed_loop_cost(problem: Problem, gains: tuple[Gains, ...], found: Certificate, runs: list[Any]) -> float:
-    """Weighted RMS error, certified bound, ITAE and effort, each relative to its requirement or limit."""
-    weights, required = problem.study.tuning.weights, problem.study.requirements.tracking_error_m
-    duration = problem.reference.duration
-    effort = max(size / limit for name, size, limit, _ in slacks(problem, found) if name != "tracking error")
-    total = weights.certified_bound * float(found.ball[0]) / required + weights.effort * effort
-    for scenario in runs:
-        shown = validation.figures(problem, problem.loop.run(gains, problem.reference, scenario))
-        if shown.diverged:
-            return math.inf
-        total += weights.rms_error * shown.rms_error_m / required / len(runs)
-        total += weights.itae * 2 * shown.itae / (required * duration**2) / len(runs)
-    return total
+def _with_digits(problem: Problem, gains: tuple[Gains, ...], digits: int) -> tuple[Gains, ...]:
+    """The gains as shorter decimals inside their ranges; those that the study fixes stay."""
+    values = [getattr(g, kind) for g in gains for kind in KINDS]
+    for i in problem.searched:
+        values[i] = rounded(values[i], digits, problem.ranges[i].low, problem.ranges[i].high)
+    return tuple(Gains(**dict(zip(KINDS, values[k : k + 4], strict=True))) for k in range(0, len(values), 4))
 
 
-def _keep(options: Options, key: str, state: SearchState) -> None:
-    """Write the state of the search atomically, so that an interrupted run can go on."""
-    if options.state is None:
-        return
-    data = {
-        "schema": "hdmm-opt/state/1",
-        "key": key,
+def _data(state: Population) -> dict[str, Any]:
+    return {
         "iteration": state.iteration,
-        "population": state.population.tolist(),
-        "outcomes": [[o.violation, o.cost if math.isfinite(o.cost) else None] for o in state.outcomes],
+        "points": state.points.tolist(),
+        "outcomes": [
+            [o.violation, o.cost if math.isfinite(o.cost) else None, list(o.objectives), o.runs] for o in state.outcomes
+        ],
         "random": state.random,
         "evaluations": state.evaluations,
+        "runs": state.runs,
     }
-    write_text(options.state, json.dumps(data))
 
 
-def _restore(options: Options, key: str) -> SearchState | None:
-    if not options.resume or options.state is None or not options.state.exists():
+def _population(state: State) -> Population | None:
+    """The population that a state holds.
+
+    Raises:
+        InvalidInputError: it holds something else.
+    """
+    data = state.get("search")
+    if data is None:
         return None
     try:
-        data = json.loads(options.state.read_text(encoding="utf-8"))
-        same = data["key"] == key
-        state = SearchState(
+        return Population(
             iteration=int(data["iteration"]),
-            population=np.array(data["population"], dtype=float),
-            outcomes=tuple(Outcome(violation=v, cost=math.inf if c is None else c) for v, c in data["outcomes"]),
+            points=np.array(data["points"], dtype=float),
+            outcomes=tuple(
+                Outcome(violation=v, cost=math.inf if c is None else c, objectives=tuple(o), runs=r)
+                for v, c, o, r in data["outcomes"]
+            ),
             random=data["random"],
             evaluations=int(data["evaluations"]),
+            runs=int(data["runs"]),
         )
-    except (OSError, ValueError, KeyError, TypeError):
-        raise InvalidInputError(
-            f"{options.state}: not a state of this release; delete it or leave out --resume"
-        ) from None
-    if not same:
-        raise InvalidInputError(
-            f"{options.state}: belongs to another study, seed or budget; delete it or leave out --resume"
-        )
-    return state
+    except (ValueError, KeyError, TypeError):
+        raise InvalidInputError(f"{state.path}: not a state of this release; delete it or leave out --resume") from None

@@ -182,11 +182,21 @@ class WeightSection(_Section):
 class TuningSection(_Section):
     """Search budget of the second stage."""
 
-    method: Literal["jaya"] = "jaya"
-    population: Annotated[int, Field(ge=4, le=500)] = 10
-    iterations: Annotated[int, Field(ge=0, le=10_000)] = 8
+    method: Literal["jaya", "tlbo", "random"] = "jaya"
+    population: Annotated[int, Field(ge=4, le=500)] = 20
+    iterations: Annotated[int, Field(ge=0, le=10_000)] = 20
+    seconds: Positive | None = None
     seed: Annotated[int, Field(ge=0)] = 1
     weights: WeightSection = WeightSection()
+
+
+class FaultSection(_Section):
+    """An actuator that loses effectiveness; outside the assumptions of a proof."""
+
+    share: Annotated[float, Field(ge=0, le=1)]
+    start_s: NonNegative
+    rate_1_s: Positive
+    stuck: Annotated[tuple[float, ...], Field(max_length=2)] = ()
 
 
 class ScenarioSection(_Section):
@@ -198,13 +208,16 @@ class ScenarioSection(_Section):
     noise: Annotated[float, Field(ge=0, le=1)] = 0.0
     bias: Annotated[float, Field(ge=-1, le=1)] = 0.0
     initial: Annotated[float, Field(ge=-1, le=1)] = 0.0
+    quantisation: Annotated[float, Field(ge=0, le=1)] = 0.0
+    fault: FaultSection | None = None
 
 
 class ValidationSection(_Section):
     """Closed-loop runs after the proof."""
 
     transient_s: NonNegative = 1.0
-    monte_carlo: Annotated[int, Field(ge=0, le=100_000)] = 20
+    monte_carlo: Annotated[int, Field(ge=0, le=100_000)] = 200
+    falsify: Annotated[int, Field(ge=0, le=1_000_000)] = 0
     worst_case: bool = True
     scenarios: Annotated[tuple[ScenarioSection, ...], Field(min_length=1)]
 

@@ -75,6 +75,12 @@ _INTERVAL: dict[str, Callable[..., Interval]] = {
     "max": Interval.maximum,
 }
 
+#: Further CasADi operations: programs may hold them, the prover does not bound them.
+_UNBOUNDED = (
+    "lt", "le", "eq", "ne", "not", "and", "or", "if_else_zero", "sign", "copysign", "floor", "ceil", "log", "pow",
+    "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh",
+)  # fmt: skip
+
 _FLOAT: dict[str, Callable[..., float]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -117,7 +123,7 @@ def run(
 
 
 def from_casadi(function: Any, names: tuple[str, ...]) -> Expression:
-    """Read the instruction list of a CasADi SX function.
+    """Read the instruction list of a CasADi SX function that the prover is to bound.
 
     Args:
         function: A `casadi.Function` over SX with one column vector as its single input and one as its output.
@@ -128,6 +134,27 @@ def from_casadi(function: Any, names: tuple[str, ...]) -> Expression:
 
     Raises:
         NotImplementedError: an instruction that the prover cannot bound; the message names it.
+        ValueError: the number of names does not match the input.
+    """
+    program = straight_line(function, names)
+    for operator, *_ in program.operations:
+        if operator not in _INTERVAL and operator not in ("input", "const"):
+            raise NotImplementedError(
+                f"the prover bounds + - * / {' '.join(list(_INTERVAL)[5:])}: {operator} came in "
+                f"{function.name()}; rewrite the model with those"
+            )
+    return program
+
+
+def straight_line(function: Any, names: tuple[str, ...]) -> Expression:
+    """Read any CasADi SX function, also one with comparisons and functions that the prover does not bound.
+
+    Args:
+        function: As for `from_casadi`.
+        names: A name for each element of the input.
+
+    Raises:
+        NotImplementedError: an instruction that is not known here; the message names it.
         ValueError: the number of names does not match the input.
     """
     import casadi as ca
@@ -151,9 +178,7 @@ def from_casadi(function: Any, names: tuple[str, ...]) -> Expression:
             work[targets[0]] = known[code](builder, *(work[i] for i in sources))
         else:
             raise NotImplementedError(
-                f"the prover bounds + - * / {' '.join(list(_INTERVAL)[5:])}: CasADi instruction {code} came in "
-                f"{function.name()}; "
-                "rewrite the model with those"
+                f"CasADi instruction {code} came in {function.name()}; rewrite the model without it"
             )
     outputs = tuple(results[i] if i in results else builder.const(0.0) for i in range(function.numel_out(0)))
     return _pruned(builder.operations, outputs)
@@ -194,7 +219,13 @@ def _casadi_operators(ca: Any) -> dict[int, Callable[..., int]]:
         ca.OP_TWICE: lambda b, i: b.add("mul", b.const(2.0), i),
         ca.OP_INV: lambda b, i: b.add("div", b.const(1.0), i),
         ca.OP_ASSIGN: lambda b, i: i,
+        **{getattr(ca, f"OP_{name.upper()}"): _plain(name) for name in _UNBOUNDED},
+        ca.OP_CONSTPOW: _plain("pow"),
     }
+
+
+def _plain(name: str) -> Callable[..., int]:
+    return lambda builder, *arguments: builder.add(name, *arguments)
 
 
 class _Builder:

@@ -13,6 +13,8 @@ class Outcome:
     Attributes:
         violation: How far it is from being proved and inside its limits; 0 for a feasible candidate.
         cost: Closed-loop cost of a feasible candidate; infinite for an infeasible one, which is never simulated.
+        objectives: The parts that a Pareto set trades off; empty for an infeasible candidate.
+        runs: Closed-loop runs that were spent on it.
 
     Raises:
         ValueError: a finite cost beside a violation.
@@ -20,9 +22,11 @@ class Outcome:
 
     violation: float
     cost: float
+    objectives: tuple[float, ...] = ()
+    runs: int = 0
 
     def __post_init__(self) -> None:
-        if self.violation > 0 and math.isfinite(self.cost):
+        if self.violation > 0 and (math.isfinite(self.cost) or self.runs):
             raise ValueError("an infeasible candidate has no cost: it is not simulated")
 
     @property

@@ -7,7 +7,8 @@ are held over a period. Simulation agrees or disagrees with a proof; it never pr
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,13 @@ from stability import Gains
 from trajectories import Reference
 
 from ..control import RAC, gain_columns
+from .engine import Batch, Engine
+from .metrics import Metrics, Yardstick, metrics, records
 from .scenario import Scenario
+from .system import System, Task
 
 Array = NDArray[np.float64]
 
-#: Control periods in one call of the compiled loop.
-CHUNK = 1000
 #: Longest integration step as a share of the plant's fastest time constant.
 STEP_SHARE = 0.35
 #: A tracking error beyond this, m, ends a run as diverged.
@@ -61,6 +63,14 @@ class Trace:
         return self.x[0] - self.r[0]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One run: gains that meet a scenario."""
+
+    gains: tuple[Gains, ...]
+    scenario: Scenario
+
+
 @dataclass
 class ClosedLoop:
     """A plant under a law at a control period; compiled once, run with any gains, parameters and scenario.
@@ -71,6 +81,9 @@ class ClosedLoop:
         noise: Bounds on the measurement errors. Shape (n,).
         initial: Bounds on the initial errors of the rows. Shape (n,).
         nominal_load: Load that the modelling terms assume, N.
+        yardstick: What the figures are measured by.
+        refinement: Factor on the number of integration steps.
+        compiled: Whether to use machine code; by default wherever it can be made.
     """
 
     law: RAC
@@ -78,7 +91,10 @@ class ClosedLoop:
     noise: tuple[float, ...]
     initial: tuple[float, ...]
     nominal_load: float
-    _compiled: dict[str, Any] = field(default_factory=dict, repr=False)
+    yardstick: Yardstick
+    refinement: int = 1
+    compiled: bool | None = None
+    _made: dict[Any, Any] = field(default_factory=dict, repr=False, init=False)
 
     def substeps(self) -> int:
         """Integration steps in one period, from the fastest time constant of the plant at nominal parameters."""
@@ -89,7 +105,7 @@ class ClosedLoop:
         values = list(plant.values().values())
         at_work = np.array(jacobian([0.3, 0.05] + [0.0] * (len(plant.states) - 2), 0, self.nominal_load, values))
         fastest = float(np.abs(np.linalg.eigvals(at_work)).max())
-        return max(2, math.ceil(self.period * fastest / STEP_SHARE))
+        return self.refinement * max(2, math.ceil(self.period * fastest / STEP_SHARE))
 
     def run(
         self, gains: tuple[Gains, ...], reference: Reference, scenario: Scenario, *, duration: float | None = None
@@ -99,59 +115,181 @@ class ClosedLoop:
         Args:
             gains: One for each governed row.
             reference: Followed from t = 0.
-            scenario: Load, parameters, noise.
+            scenario: Load, parameters, noise, quantisation, fault.
             duration: Length of the run, s; that of the reference by default.
 
         Returns:
             The run. A diverged run is shorter and says so.
         """
-        plant = self.law.plant
-        count = max(2, round((reference.duration if duration is None else duration) / self.period))
-        t = np.asarray(self.period * np.arange(count), dtype=np.float64)
-        r, load = reference(t), scenario.load_at(t)
-        noise = scenario.noise_at(count, np.array(self.noise))
-        parameters = np.array([
-            p.value * (1 + p.tolerance * scenario.parameters.get(name, 0.0)) for name, p in plant.parameters.items()
-        ])  # fmt: skip
-        n, k = len(plant.states), len(self.law.governed)
-        state = np.concatenate([self._start(gains, r[:, 0], scenario), np.zeros(k)])
-        fixed = np.concatenate([np.array(gain_columns(gains)).ravel(order="F"), parameters])
-        blocks: list[Array] = []
-        diverged = False
-        for first in range(0, count, CHUNK):
-            last = min(first + CHUNK, count)
-            columns = np.vstack([r[:, first:last], load[None, first:last], noise[:, first:last]])
-            block = self._advance(state, columns, fixed)
-            blocks.append(block)
-            state = block[: n + k, -1]
-            # a block holds the states after each period, the inputs and errors at its start
-            if not np.isfinite(block).all() or not (np.abs(block[0] - r[0, first:last]) < DIVERGED).all():
-                diverged = True
-                break
-        return self._trace(np.hstack(blocks), t, r, load, parameters, gains, scenario, diverged)
+        runs = [Run(gains=gains, scenario=scenario)]
+        engine = self.engine(_extras(runs))
+        batch = self._batch(runs, reference, duration)
+        found = engine.run(batch, trace=True)
+        lost = float(found.lost[0])
+        count = batch.shared.shape[0]
+        kept = min(count, max(2, round(lost / self.period))) if math.isfinite(lost) else count
+        rows = engine.system.signal_rows()
+        signals = {name: np.ascontiguousarray(found.trace[:kept, part, 0].T) for name, part in rows.items()}
+        theta = np.hstack([np.zeros((len(gains), 1)), signals["theta"][:, :-1]])
+        return Trace(
+            t=self._times(count)[:kept], x=signals["x"], u=signals["u"], q=signals["q"], theta=theta,
+            r=batch.shared[:kept].T, load=batch.own(0, 0, kept)[0],
+            outputs={name: signals[name][0] for name in self.law.plant.outputs}, diverged=math.isfinite(lost),
+        )  # fmt: skip
+
+    def figures(
+        self, runs: Sequence[Run], reference: Reference, *, duration: float | None = None, jobs: int = 1
+    ) -> list[Metrics]:
+        """Simulate many runs together and keep their figures only.
+
+        Args:
+            runs: Gains and scenarios; each run depends on its own alone.
+            reference: Followed from t = 0.
+            duration: Length of the runs, s; that of the reference by default.
+            jobs: Threads.
+
+        Returns:
+            The figures in the order of the runs.
+        """
+        if not runs:
+            return []
+        engine = self.engine(_extras(runs))
+        batch = self._batch(runs, reference, duration)
+        found = engine.run(batch, jobs=jobs)
+        names = [record.name for record in engine.system.records]
+        return [
+            metrics(
+                dict(zip(names, map(float, column), strict=True)), float(lost), self.yardstick, self.period,
+                batch.shared.shape[0],
+            )
+            for column, lost in zip(found.figures.T, found.lost, strict=True)
+        ]  # fmt: skip
+
+    def integration_error(self, gains: tuple[Gains, ...], reference: Reference, scenario: Scenario) -> float:
+        """Estimated error of the integration along a run, m: the change of the position when the steps are halved.
+
+        That change is about 15/16 of the error of the coarser steps (Hairer, Nørsett and Wanner 1993, II.4). Not
+        guaranteed: an estimate is no bound, and the run is one run.
+        """
+        finer = self._made.setdefault("finer", replace(self, refinement=2 * self.refinement))
+        traces = [part.run(gains, reference, scenario) for part in (self, finer)]
+        count = min(trace.t.size for trace in traces)
+        return float(np.abs(traces[0].x[0, :count] - traces[1].x[0, :count]).max()) * 16 / 15
 
     def demand(self, trace: Trace, gains: tuple[Gains, ...]) -> float:
         """The largest norm of the input that the law asked for along a run, before the amplitude limit."""
-        wanted = self._law()["demand"].map(trace.t.size)
         columns = np.vstack([trace.x, trace.r, trace.theta])
         fixed = np.repeat(np.array(gain_columns(gains)).ravel(order="F")[:, None], trace.t.size, axis=1)
-        return float(np.linalg.norm(np.array(wanted(columns, fixed)), axis=0).max())
+        return float(np.linalg.norm(np.array(self._law()["demand"](columns, fixed)), axis=0).max())
 
-    def _start(self, gains: tuple[Gains, ...], r: Array, scenario: Scenario) -> Array:
-        """The start nearest to rest inside the assumed initial errors; the scenario places the first error."""
+    def engine(self, extras: frozenset[str]) -> Engine:
+        """The engine of the loop with what some scenarios need besides: "quantisation", "fault"."""
+        if extras not in self._made:
+            self._made[extras] = Engine(self.system(extras), compiled=self.compiled)
+        return self._made[extras]
+
+    def system(self, extras: frozenset[str] = frozenset()) -> System:
+        """The loop as symbols.
+
+        Discrete states are the adaptive scalars, the commanded input, the errors, and the input that a faulty actuator
+        applies. A fault leaves ``(1 - a(t)) u + a(t) u_stuck`` with ``a = share (1 - exp(-rate (t - start)))`` from
+        its start on (Heydari Shahna 2025, P-3).
+        """
+        import casadi as ca
+
+        law, plant = self.law, self.law.plant
+        n, k, m = len(plant.states), len(law.governed), len(plant.inputs)
+        z, r, t, tau = ca.SX.sym("z", 2 * k + 2 * m), ca.SX.sym("r", 4), ca.SX.sym("t"), ca.SX.sym("tau")
+        gains, parameters = ca.SX.sym("gains", 4 * k), plant.p
+        noisy = [i for i, bound in enumerate(self.noise) if bound > 0]
+        draws, spread, offset = (ca.SX.sym(name, len(noisy)) for name in ("draws", "spread", "offset"))
+        grid, fault = ca.SX.sym("grid", n), ca.SX.sym("fault", 3 + m)
+        measured = ca.vertcat(*(
+            plant.x[i] + (spread[noisy.index(i)] * draws[noisy.index(i)] + offset[noisy.index(i)] if i in noisy else 0)
+            for i in range(n)
+        ))  # fmt: skip
+        if "quantisation" in extras:
+            measured = ca.vertcat(*(
+                ca.if_else(grid[i] > 0, grid[i] * ca.floor(measured[i] / grid[i] + 0.5), measured[i]) for i in range(n)
+            ))  # fmt: skip
+        u, theta, q = law.step(
+            measured, r, z[:k], ca.reshape(gains, k, 4), ca.DM(list(plant.values().values())),
+            ca.DM([self.nominal_load]), self.period,
+        )  # fmt: skip
+        applied = u
+        if "fault" in extras:
+            a = ca.if_else(t >= fault[1], fault[0] * (1 - ca.exp(-fault[2] * (t - fault[1]))), 0)
+            applied = (1 - a) * u + a * fault[3:]
+        now, acting = z[k : k + m], z[2 * k + m :]
+        outputs = {name: ca.substitute([value], [plant.u], [acting])[0] for name, value in plant.outputs.items()}
+        return System(
+            x=plant.x, z=z, shared=r, own=plant.w, draws=draws,
+            fixed=ca.vertcat(gains, parameters, spread, offset, grid, fault), t=t, tau=tau,
+            tasks=(Task(every=1, after=ca.vertcat(theta, u, q, applied)),),
+            rate=ca.substitute([plant.rate], [plant.u], [acting])[0],
+            alive=ca.fabs(plant.x[0] - r[0]) < DIVERGED,
+            records=records(plant, self.yardstick, plant.x, now, r, outputs, t, tau),
+            signals={"x": plant.x, "u": now, "q": z[k + m : 2 * k + m], "theta": z[:k], **outputs},
+            period=self.period, substeps=self.substeps(),
+        )  # fmt: skip
+
+    def _times(self, count: int) -> Array:
+        return np.asarray(self.period * np.arange(count), dtype=np.float64)
+
+    def _batch(self, runs: Sequence[Run], reference: Reference, duration: float | None) -> Batch:
         plant = self.law.plant
-        x = np.zeros(len(plant.states))
-        x[0] = r[0] + scenario.initial * self.initial[0]
-        columns = np.array(gain_columns(gains)).ravel(order="F")
-        for i in range(1, len(x)):
-            now = np.concatenate([x, r, np.zeros(len(gains))])
-            target = float(np.array(self._law()["targets"](now, columns)).ravel()[i])
-            x[i] = target + min(max(-target, -self.initial[i]), self.initial[i])
+        count = max(2, round((reference.duration if duration is None else duration) / self.period))
+        t = self._times(count)
+        r = self._sampled(reference, count)
+        bounds = np.array([bound for bound in self.noise if bound > 0])
+        columns = []
+        for run in runs:
+            s = run.scenario
+            parameters = [
+                p.value * (1 + p.tolerance * s.parameters.get(name, 0.0)) for name, p in plant.parameters.items()
+            ]
+            random = s.noise * (1 - abs(s.bias)) * (1 - s.quantisation)
+            grid = 2 * s.quantisation * np.array(self.noise)
+            columns.append(np.concatenate([
+                np.array(gain_columns(run.gains)).ravel(order="F"), parameters, bounds * random,
+                bounds * s.bias * (1 - s.quantisation), grid, s.fault_column(len(plant.inputs)),
+            ]))  # fmt: skip
+        z = np.zeros((2 * len(self.law.governed) + 2 * len(plant.inputs), len(runs)))
+        return Batch(
+            fixed=np.array(columns).T,
+            seeds=np.array([_seed(run.scenario.seed) for run in runs], dtype=np.uint64),
+            x=self._starts(runs, r[0]),
+            z=z,
+            shared=r,
+            own=lambda run, first, size: runs[run].scenario.load_at(t[first : first + size])[None, :],
+        )
+
+    def _sampled(self, reference: Reference, count: int) -> Array:
+        """Position … jerk at the control instants; kept for the reference that was asked for last. Shape (count, 4)."""
+        last = self._made.get("reference")
+        if last is None or last[0] is not reference or last[1].shape[0] != count:
+            last = (reference, np.ascontiguousarray(reference(self._times(count)).T))
+            self._made["reference"] = last
+        return last[1]
+
+    def _starts(self, runs: Sequence[Run], r: Array) -> Array:
+        """The start nearest to rest inside the assumed initial errors; the scenario places the first error.
+
+        Shape (n, runs).
+        """
+        n, k = len(self.law.plant.states), len(self.law.governed)
+        x = np.zeros((n, len(runs)))
+        x[0] = r[0] + self.initial[0] * np.array([run.scenario.initial for run in runs])
+        columns = np.array([np.array(gain_columns(run.gains)).ravel(order="F") for run in runs]).T
+        rest = np.vstack([np.repeat(r[:, None], len(runs), axis=1), np.zeros((k, len(runs)))])
+        for i in range(1, n):
+            target = np.array(self._law()["targets"](np.vstack([x, rest]), columns))[i]
+            x[i] = target + np.clip(-target, -self.initial[i], self.initial[i])
         return x
 
     def _law(self) -> dict[str, Any]:
         """CasADi functions of ([x; r; theta], gains) without the amplitude limit: row targets, and the input."""
-        if "law" not in self._compiled:
+        if "law" not in self._made:
             import casadi as ca
 
             plant, law = self.law.plant, self.law
@@ -162,76 +300,21 @@ class ClosedLoop:
             virtual, _ = law.virtual_controls(x, r, theta, ca.reshape(fixed, k, 4), nominal, self.nominal_load)
             goals = [r[0] if t == "reference" else 0 if t == "zero" else virtual[int(t)] for t in plant.targets]
             wanted = ca.vertcat(*(virtual[row] for row in plant.drives))
-            self._compiled["law"] = {
+            self._made["law"] = {
                 "targets": ca.Function("targets", [now, fixed], [ca.vertcat(*goals)]),
                 "demand": ca.Function("demand", [now, fixed], [wanted]),
             }
-        return self._compiled["law"]
-
-    def _advance(self, state: Array, columns: Array, fixed: Array) -> Array:
-        size = columns.shape[1]
-        key = f"loop{size}"
-        if key not in self._compiled:
-            self._compiled[key] = self._period_map().mapaccum(key, size)
-        out = self._compiled[key](state, columns, np.repeat(fixed[:, None], size, axis=1))
-        return np.vstack([np.array(part) for part in out])
-
-    def _period_map(self) -> Any:
-        """CasADi function (state, [r; load; noise], [gains; parameters]) -> (state after a period, [u; Q])."""
-        if "period" not in self._compiled:
-            import casadi as ca
-
-            law, plant = self.law, self.law.plant
-            n, k = len(plant.states), len(law.governed)
-            state, columns = ca.SX.sym("state", n + k), ca.SX.sym("columns", 5 + n)
-            fixed = ca.SX.sym("fixed", 4 * k + plant.p.numel())
-            gains, parameters = ca.reshape(fixed[: 4 * k], k, 4), fixed[4 * k :]
-            nominal = ca.DM(list(plant.values().values()))
-            measured = state[:n] + columns[5:]
-            u, theta, q = law.step(
-                measured, columns[:4], state[n:], gains, nominal, ca.DM([self.nominal_load]), self.period
-            )
-            rate = ca.Function("rate", [plant.x, plant.u, plant.w, plant.p], [plant.rate])
-            after = _runge_kutta(rate, state[:n], u, columns[4], parameters, self.period, self.substeps())
-            self._compiled["period"] = ca.Function(
-                "period", [state, columns, fixed], [ca.vertcat(after, theta), ca.vertcat(u, q)]
-            )
-        return self._compiled["period"]
-
-    def _trace(
-        self, block: Array, t: Array, r: Array, load: Array, parameters: Array, gains: tuple[Gains, ...],
-        scenario: Scenario, diverged: bool,
-    ) -> Trace:  # fmt: skip
-        plant = self.law.plant
-        n, k, m, count = len(plant.states), len(self.law.governed), len(plant.inputs), block.shape[1]
-        start = np.concatenate([self._start(gains, r[:, 0], scenario), np.zeros(k)])
-        states = np.hstack([start[:, None], block[: n + k, :-1]])
-        u, q = block[n + k : n + k + m], block[n + k + m :]
-        return Trace(
-            t=t[:count], x=states[:n], u=u, q=q, theta=states[n:], r=r[:, :count], load=load[:count],
-            outputs=self._outputs(states[:n], u, load[:count], parameters), diverged=diverged,
-        )  # fmt: skip
-
-    def _outputs(self, x: Array, u: Array, load: Array, parameters: Array) -> dict[str, Array]:
-        if "outputs" not in self._compiled:
-            import casadi as ca
-
-            plant = self.law.plant
-            self._compiled["outputs"] = ca.Function(
-                "outputs", [plant.x, plant.u, plant.w, plant.p], [ca.vertcat(*plant.outputs.values())]
-            )
-        mapped = self._compiled["outputs"].map(x.shape[1])
-        values = np.array(mapped(x, u, load[None, :], np.repeat(parameters[:, None], x.shape[1], axis=1)))
-        return dict(zip(self.law.plant.outputs, values, strict=True))
+        return self._made["law"]
 
 
-def _runge_kutta(rate: Any, x: Any, u: Any, w: Any, p: Any, period: float, steps: int) -> Any:
-    """Classical fourth-order steps over one period with held input and load."""
-    h = period / steps
-    for _ in range(steps):
-        k1 = rate(x, u, w, p)
-        k2 = rate(x + h / 2 * k1, u, w, p)
-        k3 = rate(x + h / 2 * k2, u, w, p)
-        k4 = rate(x + h * k3, u, w, p)
-        x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return x
+def _extras(runs: Sequence[Run]) -> frozenset[str]:
+    wanted = {
+        "quantisation": any(run.scenario.quantisation > 0 for run in runs),
+        "fault": any(run.scenario.fault is not None for run in runs),
+    }
+    return frozenset(name for name, needed in wanted.items() if needed)
+
+
+def _seed(seed: int) -> int:
+    """A seed of the draws: neighbouring numbers give unrelated streams."""
+    return int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])

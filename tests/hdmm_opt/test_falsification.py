@@ -44,13 +44,13 @@ def test_repeats_and_keeps_to_its_budget(problem):
 
 def test_loads_stay_inside_their_range(problem, monkeypatch):
     seen = []
-    real = type(problem.loop).run
+    real = type(problem.loop).figures
 
-    def watch(self, gains, reference, scenario, **named):
-        seen.append(scenario)
-        return real(self, gains, reference, scenario, duration=0.05)
+    def watch(self, runs, reference, **named):
+        seen.extend(run.scenario for run in runs)
+        return real(self, runs, reference, duration=0.05)
 
-    monkeypatch.setattr(type(problem.loop), "run", watch)
+    monkeypatch.setattr(type(problem.loop), "figures", watch)
     falsify(problem, GAINS, [], 120, 3, quiet)
     low, high = problem.study.uncertainty.load_force_n
     for scenario in seen:
@@ -74,8 +74,8 @@ def test_a_witness_outside_the_envelope_is_a_defect(tmp_path, gain_text, monkeyp
     path = tmp_path / "x.gains.json"
     path.write_text(gain_text, encoding="utf-8")
 
-    def lie(*arguments):
-        found = falsify(*arguments[:3], 2, *arguments[4:])
+    def lie(*arguments, **named):
+        found = falsify(*arguments[:3], 2, *arguments[4:], **named)
         return replace(found, metrics=replace(found.metrics, maximum_error_m=0.01), largest_error=0.01)
 
     monkeypatch.setattr("hdmm_opt.falsification.falsify", lie)

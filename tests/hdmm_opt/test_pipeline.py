@@ -6,11 +6,12 @@ import pytest
 
 from hdmm_opt import gain_file, pipeline, selection, study
 from hdmm_opt.errors import DefectError
+from hdmm_opt.evaluation import make_evaluator
 from hdmm_opt.files import write_text
 from hdmm_opt.problem import assemble
 from hdmm_opt.proof import certificate, diagnose, longest_period, provable_share, shrunk, violation
 from hdmm_opt.selection import Options, Progress
-from hdmm_opt.simulation import ClosedLoop, Scenario
+from hdmm_opt.simulation import Engine, Scenario
 from stability import Certificate, Failure, Gains, certify, checker
 
 
@@ -30,12 +31,12 @@ def test_infeasible_candidates_are_never_simulated(monkeypatch):
     def refuse(*arguments, **named):
         raise AssertionError("simulated")
 
-    monkeypatch.setattr(ClosedLoop, "run", refuse)
-    evaluate = selection.make_evaluator(study.load("emla-p2"))
-    outcome = evaluate(np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]))
-    assert not outcome.feasible and outcome.cost == math.inf
+    monkeypatch.setattr(Engine, "run", refuse)
+    evaluate = make_evaluator(study.load("emla-p2"))
+    (outcome,) = evaluate([np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])])
+    assert not outcome.feasible and outcome.cost == math.inf and outcome.runs == 0
     with pytest.raises(AssertionError, match="simulated"):
-        evaluate(np.array([0.45, 0.1, 0.1, 0.5, 0.6, 0.1, 0.1, 0.9]))
+        evaluate([np.array([0.45, 0.1, 0.1, 0.5, 0.6, 0.1, 0.1, 0.9])])
 
 
 def test_points_and_gains_go_round():

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -7,7 +9,7 @@ from hdmm_opt.control import RAC
 from hdmm_opt.plants import pmsm_emla
 from hdmm_opt.problem import assemble
 from hdmm_opt.proof import certificate
-from hdmm_opt.simulation import ClosedLoop, Scenario, measure, scenarios
+from hdmm_opt.simulation import ClosedLoop, Fault, Run, Scenario, Yardstick, scenarios
 from hdmm_opt.validation import clopper_pearson
 from stability import Failure, Gains
 from trajectories import Reference, constant, quintic
@@ -16,9 +18,15 @@ GAINS = (Gains(beta=24.0, epsilon=50.0, delta=2.0, sigma=5.0), Gains(beta=5900.0
 MOVE = Reference(segments=(constant(0.1, 0, 0.2), quintic(0.1, 0.2, 0.2, 2.5), constant(0.2, 2.7, 3)))
 
 
-def loop(period=1e-3, noise=(0.0, 0.0, 0.0)):
+def loop(period=1e-3, noise=(0.0, 0.0, 0.0), **more):
     return ClosedLoop(
-        law=RAC(plant=pmsm_emla("torque")), period=period, noise=noise, initial=(1e-3, 0.0, 0.0), nominal_load=70e3
+        law=RAC(plant=pmsm_emla("torque")),
+        period=period,
+        noise=noise,
+        initial=(1e-3, 0.0, 0.0),
+        nominal_load=70e3,
+        yardstick=Yardstick(transient=0.5, band=1e-3, transmission=3.3e-4),
+        **more,
     )
 
 
@@ -52,8 +60,7 @@ def test_agrees_with_an_independent_adaptive_integrator():
 
 
 def test_finer_steps_change_nothing_that_matters():
-    coarse, fine = loop(), loop()
-    fine.substeps = lambda: 4 * coarse.substeps()  # type: ignore[method-assign]
+    coarse, fine = loop(), loop(refinement=4)
     runs = [
         part.run(GAINS, MOVE, Scenario(name="x", load=((0.0, 65e3), (1.0, 65e3), (1.1, 76e3))))
         for part in (coarse, fine)
@@ -65,29 +72,57 @@ def test_divergence_is_seen_and_ends_the_run():
     wild = (Gains(beta=3000.0), Gains(beta=5e6))
     trace = loop(period=0.02).run(wild, MOVE, Scenario(name="x", load=((0.0, -9e5),)), duration=60.0)
     assert trace.diverged and trace.t[-1] < 59
-    figures = measure(trace, 0.5, 1e-3, 3.3e-4)
-    assert figures.maximum_error_m == np.inf and figures.diverged
+    run = Run(gains=wild, scenario=Scenario(name="x", load=((0.0, -9e5),)))
+    (figures,) = loop(period=0.02).figures([run], MOVE, duration=60.0)
+    assert figures.maximum_error_m == np.inf and figures.diverged and np.isfinite(figures.peak_torque_nm)
 
 
 def test_noise_and_start_stay_in_their_assumptions_and_repeat():
     made = Scenario(name="x", load=((0.0, 70e3),), noise=0.5, initial=-1.0, seed=9)
     part = loop(noise=(1e-5, 1e-3, 0.0))
-    draws = made.noise_at(5000, np.array(part.noise))
-    assert np.abs(draws).max(axis=1) == pytest.approx([5e-6, 5e-4, 0.0], rel=1e-2)
+    clean = part.run(GAINS, MOVE, replace(made, noise=0.0), duration=0.3)
     first, again = (part.run(GAINS, MOVE, made, duration=0.3) for _ in range(2))
     assert (first.x == again.x).all()
     assert first.error[0] == pytest.approx(-1e-3)
+    assert 0 < np.abs(first.q - clean.q)[0].max() < 2 * 5e-6
 
 
-def test_metrics_of_a_known_signal():
-    part = loop().run(GAINS, MOVE, Scenario(name="x", load=((0.0, 70e3),)), duration=0.5)
-    part.x[0] = part.r[0] + 1e-3 * np.sign(np.sin(200 * part.t)) * (part.t < 0.3)
-    part.outputs["torque"][:] = 3.0
-    figures = measure(part, 0.1, 0.5e-3, 3.3e-4)
-    assert figures.maximum_error_m == pytest.approx(1e-3)
-    assert figures.settling_time_s == pytest.approx(0.3, abs=2e-3)
-    assert figures.rms_torque_nm == pytest.approx(3.0)
-    assert figures.rms_error_m == pytest.approx(1e-3 * np.sqrt(0.5), rel=0.02)
+def test_figures_are_those_of_the_trace():
+    """The records of the engine against NumPy on the signals of the same run."""
+    part = loop(noise=(1e-5, 1e-3, 0.0))
+    scenario = Scenario(name="x", load=((0.0, 65e3), (1.0, 65e3), (1.1, 76e3)), noise=1.0, initial=1.0, bias=0.2)
+    (found,) = part.figures([Run(gains=GAINS, scenario=scenario)], MOVE)
+    trace = part.run(GAINS, MOVE, scenario)
+    error, late, torque = np.abs(trace.error), trace.t >= 0.5, trace.outputs["torque"]
+    assert found.largest_error_m >= error.max() == pytest.approx(found.largest_error_m, rel=1e-3)
+    assert found.maximum_error_m == pytest.approx(error[late].max(), rel=1e-3)
+    assert found.rms_error_m == pytest.approx(np.sqrt(np.mean(error[late] ** 2)), rel=1e-12)
+    assert found.settling_time_s == pytest.approx(trace.t[np.flatnonzero(error > 1e-3)[-1] + 1])
+    assert found.peak_torque_nm == np.abs(torque).max()
+    assert found.rms_torque_nm == pytest.approx(np.sqrt(np.mean(torque**2)), rel=1e-12)
+    assert found.peak_current_a == trace.outputs["current"].max()
+    assert found.peak_input == np.abs(trace.u).max()
+    assert found.energy_j == pytest.approx((torque * trace.x[1]).sum() * 1e-3 / 3.3e-4, rel=1e-12)
+    assert found.itae == pytest.approx((trace.t * error).sum() * 1e-3, rel=1e-12)
+    assert found.limit_use >= np.abs(trace.u).max() / 77.0
+
+
+def test_a_quantised_position_stays_inside_its_bound_and_a_fault_outside_the_assumptions():
+    part = loop(noise=(1e-4, 1e-3, 0.0))
+    coarse = Scenario(name="x", load=((0.0, 70e3),), quantisation=1.0)
+    trace = part.run(GAINS, MOVE, coarse, duration=1.0)
+    measured = trace.q[0] + trace.r[0]
+    assert np.abs(measured - trace.x[0]).max() <= 1e-4 * (1 + 1e-9)
+    assert measured / 2e-4 == pytest.approx(np.round(measured / 2e-4), abs=1e-6)
+    assert np.unique(np.round(measured / 2e-4)).size > 3
+
+    weak = Scenario(name="x", load=((0.0, 70e3),), fault=Fault(share=0.2, start_s=0.5, rate_1_s=50.0))
+    healthy = part.run(GAINS, MOVE, replace(weak, fault=None), duration=1.0)
+    faulty = part.run(GAINS, MOVE, weak, duration=1.0)
+    assert (faulty.x[:, :500] == healthy.x[:, :500]).all()
+    # the same load asks for the same torque: the command rises by what is lost
+    assert faulty.u[0, -1] == pytest.approx(healthy.u[0, -1] / 0.8, rel=1e-2)
+    assert not weak.covered and coarse.covered
 
 
 def test_clopper_pearson_closed_form():

@@ -5,7 +5,8 @@ import pytest
 from known_answers import chain_bounds, integrator_chain
 
 from stability import Composition, Gains, certify
-from tuning import Executor, Outcome, select, start, step
+from tuning import Outcome, executor, select, start
+from tuning.jaya import jaya
 
 
 def sphere(points):
@@ -34,17 +35,17 @@ def test_feasible_comes_before_infeasible():
 
 def test_one_step_is_the_published_formula_with_greedy_acceptance():
     state = start(sphere, np.array([0.9, 0.9]), 6, seed=4)
-    after = step(sphere, state)
+    after = jaya(sphere, state)
     random = np.random.default_rng()
     random.bit_generator.state = state.random
-    x = state.population
+    x = state.points
     costs = [o.cost for o in state.outcomes]
     best, worst = x[int(np.argmin(costs))], x[int(np.argmax(costs))]
     r1, r2 = random.uniform(size=x.shape), random.uniform(size=x.shape)
     trial = np.clip(x + r1 * (best - np.abs(x)) - r2 * (worst - np.abs(x)), 0, 1)
     for k in range(6):
         new, old = ((trial[k] - 0.3) ** 2).sum(), costs[k]
-        assert after.population[k] == pytest.approx(trial[k] if new < old else x[k])
+        assert after.points[k] == pytest.approx(trial[k] if new < old else x[k])
         assert after.outcomes[k].cost <= old
     assert after.evaluations == 12 and after.iteration == 1
 
@@ -53,29 +54,29 @@ def test_search_converges_and_repeats():
     def run(seed):
         state = start(sphere, np.full(3, 0.9), 12, seed)
         for _ in range(60):
-            state = step(sphere, state)
+            state = jaya(sphere, state)
         return state
 
     first, again = run(1), run(1)
     assert first.outcomes[first.best].cost < 1e-4
-    assert (first.population == again.population).all()
+    assert (first.points == again.points).all()
 
 
 def test_search_ends_inside_the_feasible_set_at_its_edge():
     state = start(disc, np.array([0.1, 0.8]), 12, seed=2)
     for _ in range(60):
-        state = step(disc, state)
-    best = state.population[state.best]
+        state = jaya(disc, state)
+    best = state.points[state.best]
     assert state.outcomes[state.best].feasible and best[0] == pytest.approx(0.6, abs=0.02)
 
 
 def make_square(shift):
-    return lambda value: value * value + shift
+    return lambda values: [value * value + shift for value in values]
 
 
 def test_executors_agree():
     items = list(range(20))
-    with Executor(make_square, (3,), 1) as one, Executor(make_square, (3,), 2) as two:
+    with executor(make_square, (3,), 1) as one, executor(make_square, (3,), 2) as two:
         assert one.map(items) == two.map(items) == [i * i + 3 for i in items]
 
 

@@ -1,0 +1,313 @@
+"""From the symbols of a loop to LLVM code: one function that moves a group of lanes over many ticks.
+
+The instruction lists of the tasks, the rate and the figures are written out in line; what depends on the constants of a
+run alone is left for LLVM to move out of the loops. Lanes are independent: a lost one neither slows nor spoils others.
+
+    run(first, count, shared, own, fixed, seeds, state, trace)
+
+with every array of doubles but `seeds`, all row-major with the lanes last: shared (ticks, s) without lanes,
+own (ticks, l, lanes), fixed (f, lanes), state (n + d + 1 + records, lanes), trace (ticks, signals, lanes). The row
+after the discrete states holds the time at which a run was lost, or infinity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from stability.expression import Expression, straight_line
+
+from .instructions import Assembler
+from .system import System
+
+#: How soon a value is known: constants, a run's constants, a tick's, an integration step's.
+_LEVEL = {"f": 1, "s": 2, "l": 2, "v": 2, "z": 2, "t": 2, "x": 3, "d": 3}
+
+_COMPARISONS = {"lt": "olt", "le": "ole", "eq": "oeq", "ne": "une"}
+_LIBRARY = ("log", "pow", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh")
+
+
+def compiled_text(system: System, lanes: int, *, trace: bool) -> str:
+    """The LLVM module of a loop.
+
+    Args:
+        system: The loop.
+        lanes: Runs that one call moves together.
+        trace: Whether the signals are stored at every tick.
+
+    Raises:
+        NotImplementedError: an operation that the compiler does not know; the message names it.
+    """
+    return _Compiler(system, Assembler(lanes), trace).text()
+
+
+class _Compiler:
+    def __init__(self, system: System, out: Assembler, trace: bool) -> None:
+        self.system, self.out, self.trace = system, out, trace
+        self.sizes = system.sizes
+
+    def text(self) -> str:
+        out, system, sizes = self.out, self.system, self.sizes
+        kept = sizes["x"] + sizes["z"]
+        cells = kept + 1 + len(system.records)
+        fixed = [self.load("%fixed", i) for i in range(sizes["f"])]
+        seeds = self._load_seeds()
+        boxes = [f"%b{i}" for i in range(cells)]
+        for i, box in enumerate(boxes):
+            out.write(f"  {box} = alloca {out.real}, align 64")
+            out.write(f"  store {out.real} {self.load('%state', i)}, ptr {box}, align 8")
+        out.write("  %end = add i64 %first, %count")
+        out.write("  br label %tick")
+        out.write("tick:")
+        out.write("  %k = phi i64 [ %first, %entry ], [ %next, %ticked ]")
+        out.write("  %row = sub i64 %k, %first")
+        known = {f"f{i}": value for i, value in enumerate(fixed)}
+        self._tick(known, boxes[: sizes["x"]], boxes[sizes["x"] : kept], boxes[kept], boxes[kept + 1 :], seeds)
+        out.write("  br label %ticked")
+        out.write("ticked:")
+        out.write("  %next = add i64 %k, 1")
+        out.write("  %more = icmp slt i64 %next, %end")
+        out.write("  br i1 %more, label %tick, label %done")
+        out.write("done:")
+        for i, box in enumerate(boxes):
+            self.store("%state", i, self.read(box))
+        pointers = ("shared", "own", "fixed", "seeds", "state", "trace")
+        head = f"define void @run(i64 %first, i64 %count, {', '.join(f'ptr noalias %{p}' for p in pointers)}) {{"
+        return "\n".join([*sorted(out.declared), head, "entry:", *out.pool, *out.lines, "  ret void", "}", ""])
+
+    def _tick(
+        self, known: dict[str, str], x: list[str], z: list[str], lost: str, figures: list[str], seeds: str
+    ) -> None:
+        """Columns and draws, tasks, signals, then the integration steps with the figures."""
+        out, system, sizes = self.out, self.system, self.sizes
+        known = known | {"t0": out.spread(self._scaled("%k", system.period)), "d0": out.const(0.0)}
+        known |= {f"s{i}": out.spread(self._scalar("%shared", sizes["s"], i)) for i in range(sizes["s"])}
+        known |= {f"l{i}": self.load("%own", i, rows=sizes["l"]) for i in range(sizes["l"])}
+        known |= {f"v{i}": self._draw(seeds, i) for i in range(sizes["v"])}
+        known |= {f"x{i}": self.read(box) for i, box in enumerate(x)}
+        for task in system.tasks:
+            self._task(task.every, task.after, known, z)
+        known |= {f"z{i}": self.read(box) for i, box in enumerate(z)}
+        (sound,) = self.values(system.alive, known)
+        stamp, before = known["t0"], self.read(lost)
+        failed = out.compare("oeq", sound, out.const(0.0))
+        first = out.select(out.compare("olt", before, stamp), before, stamp)
+        now = out.select(failed, first, before)
+        self.keep(lost, now)
+        alive = out.compare("oeq", now, out.const(float("inf")))
+        if self.trace:
+            rows = [value for column in system.signals.values() for value in self.values(column, known)]
+            for i, value in enumerate(rows):
+                self.store("%trace", i, value, rows=len(rows))
+        self._record(known, figures, alive, lambda record: True)
+        self._steps(known, x, figures, alive)
+
+    def _task(self, every: int, after: Any, known: dict[str, str], z: list[str]) -> None:
+        out = self.out
+        if every > 1:
+            due, on = out.label("due"), out.label("after")
+            rest = out.emit(f"srem i64 %k, {every}")
+            out.write(f"  br i1 {out.emit(f'icmp eq i64 {rest}, 0')}, label %{due}, label %{on}")
+            out.write(f"{due}:")
+        now = known | {f"z{i}": self.read(box) for i, box in enumerate(z)}
+        for box, value in zip(z, self.values(after, now), strict=True):
+            self.keep(box, value)
+        if every > 1:
+            out.write(f"  br label %{on}")
+            out.write(f"{on}:")
+
+    def _steps(self, known: dict[str, str], x: list[str], figures: list[str], alive: str) -> None:
+        """Classical Runge-Kutta steps; the figures between the ticks after each."""
+        out, system = self.out, self.system
+        steps, h = system.substeps, system.period / system.substeps
+        above = out.label("above")
+        loop, leave = out.label("step"), out.label("stepped")
+        out.write(f"  br label %{above}")
+        out.write(f"{above}:")
+        out.write(f"  br label %{loop}")
+        out.write(f"{loop}:")
+        index, following = f"%i.{loop}", f"%n.{loop}"
+        out.write(f"  {index} = phi i64 [ 0, %{above} ], [ {following}, %{loop} ]")
+        start = [self.read(box) for box in x]
+
+        def rate(at: list[str]) -> list[str]:
+            return self.values(system.rate, known | {f"x{i}": value for i, value in enumerate(at)})
+
+        def moved(slope: list[str], by: float) -> list[str]:
+            return [out.fma(out.const(by), s, a) for s, a in zip(slope, start, strict=True)]
+
+        k1 = rate(start)
+        k2 = rate(moved(k1, h / 2))
+        k3 = rate(moved(k2, h / 2))
+        k4 = rate(moved(k3, h))
+        outer = [out.add(a, b) for a, b in zip(k1, k4, strict=True)]
+        inner = [out.add(a, b) for a, b in zip(k2, k3, strict=True)]
+        slope = [out.fma(out.const(2.0), i, o) for i, o in zip(inner, outer, strict=True)]
+        after = moved(slope, h / 6)
+        for box, value in zip(x, after, strict=True):
+            self.keep(box, value)
+        out.write(f"  {following} = add i64 {index}, 1")
+        if any(record.between for record in system.records):
+            now = known | {f"x{i}": value for i, value in enumerate(after)}
+            now["d0"] = out.spread(self._scaled(following, h))
+            self._record(now, figures, alive, lambda record: record.between)
+        out.write(f"  br i1 {out.emit(f'icmp slt i64 {following}, {steps}')}, label %{loop}, label %{leave}")
+        out.write(f"{leave}:")
+
+    def _record(self, known: dict[str, str], figures: list[str], alive: str, wanted: Callable[[Any], bool]) -> None:
+        import casadi as ca
+
+        out = self.out
+        chosen = [(box, r) for box, r in zip(figures, self.system.records, strict=True) if wanted(r)]
+        if not chosen:
+            return
+        values = self.values(ca.vertcat(*(record.value for _, record in chosen)), known)
+        for (box, record), value in zip(chosen, values, strict=True):
+            before = self.read(box)
+            if record.kind == "max":
+                after = out.select(out.compare("ogt", value, before), value, before)
+            else:
+                after = out.add(before, value)
+            self.keep(box, out.select(alive, after, before))
+
+    def values(self, column: Any, known: Mapping[str, str]) -> list[str]:
+        """The elements of a column of symbols, written out in line."""
+        return _inline(self.out, self._expression(column), known)
+
+    def _expression(self, column: Any) -> Expression:
+        import casadi as ca
+
+        groups = self.system.groups
+        symbols = ca.vertcat(*groups.values())
+        names = tuple(f"{letter}{i}" for letter, group in groups.items() for i in range(group.numel()))
+        return straight_line(ca.Function("part", [symbols], [column], {"cse": True}), names)
+
+    def load(self, pointer: str, row: int, rows: int | None = None) -> str:
+        """A row of lanes; `rows` to a tick where the array has ticks."""
+        return self.out.emit(f"load {self.out.real}, ptr {self._place(pointer, row, rows)}, align 8")
+
+    def store(self, pointer: str, row: int, value: str, rows: int | None = None) -> None:
+        """Write a row of lanes."""
+        place = self._place(pointer, row, rows)
+        self.out.write(f"  store {self.out.real} {value}, ptr {place}, align 8")
+
+    def read(self, box: str) -> str:
+        return self.out.emit(f"load {self.out.real}, ptr {box}, align 64")
+
+    def keep(self, box: str, value: str) -> None:
+        self.out.write(f"  store {self.out.real} {value}, ptr {box}, align 64")
+
+    def _place(self, pointer: str, row: int, rows: int | None) -> str:
+        out = self.out
+        if rows is None:
+            return out.emit(f"getelementptr double, ptr {pointer}, i64 {row * out.lanes}")
+        base = out.emit(f"mul i64 %row, {rows * out.lanes}")
+        return out.emit(f"getelementptr double, ptr {pointer}, i64 {out.emit(f'add i64 {base}, {row * out.lanes}')}")
+
+    def _scalar(self, pointer: str, rows: int, row: int) -> str:
+        out = self.out
+        base = out.emit(f"mul i64 %row, {rows}")
+        place = out.emit(f"getelementptr double, ptr {pointer}, i64 {out.emit(f'add i64 {base}, {row}')}")
+        return out.emit(f"load double, ptr {place}, align 8")
+
+    def _scaled(self, index: str, unit: float) -> str:
+        scalar = Assembler(1)
+        return self.out.emit(f"fmul double {self.out.emit(f'sitofp i64 {index} to double')}, {scalar.const(unit)}")
+
+    def _load_seeds(self) -> str:
+        return self.out.emit(f"load {self.out.whole}, ptr %seeds, align 8")
+
+    def _draw(self, seeds: str, channel: int) -> str:
+        out = self.out
+        first = out.emit(f"mul i64 %k, {self.sizes['v']}")
+        return out.uniform(seeds, out.spread(out.emit(f"add i64 {first}, {channel + 1}"), "i64"))
+
+
+def _inline(out: Assembler, program: Expression, known: Mapping[str, str]) -> list[str]:
+    """Write a straight-line program.
+
+    Products that are used once are fused into sums, and a division by what is known sooner than the dividend becomes a
+    product with the reciprocal, which then leaves the loop.
+    """
+    operations = program.operations
+    uses = [0] * len(operations)
+    for operator, *arguments in operations:
+        if operator not in ("input", "const"):
+            for index in arguments:
+                uses[index] += 1
+    for index in program.outputs:
+        uses[index] += 1
+    names: list[str] = []
+    levels: list[int] = []
+
+    def product(index: int) -> tuple[str, str] | None:
+        operator, *arguments = operations[index]
+        if operator not in ("mul", "sq") or uses[index] > 1:
+            return None
+        return names[arguments[0]], names[arguments[-1]]
+
+    for operator, *arguments in operations:
+        if operator == "input":
+            names.append(known[arguments[0]])
+            levels.append(_LEVEL[arguments[0][0]])
+            continue
+        if operator == "const":
+            names.append(out.const(float(arguments[0])))
+            levels.append(0)
+            continue
+        levels.append(max((levels[i] for i in arguments), default=0))
+        fused = _fused(out, operator, [names[i] for i in arguments], [product(i) for i in arguments])
+        if fused is not None:
+            names.append(fused)
+        elif operator == "div" and levels[arguments[1]] < levels[arguments[0]]:
+            inverse = out.div(out.const(1.0), names[arguments[1]])
+            names.append(out.mul(names[arguments[0]], inverse))
+        else:
+            names.append(_operation(out, operator, [names[i] for i in arguments]))
+    return [names[index] for index in program.outputs]
+
+
+def _fused(out: Assembler, operator: str, names: list[str], products: list[tuple[str, str] | None]) -> str | None:
+    if operator not in ("add", "sub"):
+        return None
+    first, second = products
+    if second is not None:
+        a, b = second
+        return out.fma(out.neg(a) if operator == "sub" else a, b, names[0])
+    if first is not None:
+        return out.fma(*first, out.neg(names[1]) if operator == "sub" else names[1])
+    return None
+
+
+def _operation(out: Assembler, operator: str, names: list[str]) -> str:
+    simple: dict[str, Callable[..., str]] = {
+        "add": out.add, "sub": out.sub, "mul": out.mul, "div": out.div, "neg": out.neg,
+        "sq": lambda a: out.mul(a, a),
+        "sqrt": lambda a: out.intrinsic("sqrt", a), "abs": lambda a: out.intrinsic("fabs", a),
+        "floor": lambda a: out.intrinsic("floor", a), "ceil": lambda a: out.intrinsic("ceil", a),
+        "copysign": lambda a, b: out.intrinsic("copysign", a, b),
+        "exp": out.exp, "tanh": out.tanh, "sin": out.sin, "cos": out.cos,
+        "min": lambda a, b: out.select(out.compare("olt", a, b), a, b),
+        "max": lambda a, b: out.select(out.compare("ogt", a, b), a, b),
+        "not": lambda a: _truth(out, "oeq", a, out.const(0.0)),
+        "and": lambda a, b: _truth(out, "une", out.mul(_unit(out, a), _unit(out, b)), out.const(0.0)),
+        "or": lambda a, b: _truth(out, "une", out.add(_unit(out, a), _unit(out, b)), out.const(0.0)),
+        "if_else_zero": lambda c, a: out.select(out.compare("une", c, out.const(0.0)), a, out.const(0.0)),
+        "sign": lambda a: out.sub(_truth(out, "ogt", a, out.const(0.0)), _truth(out, "olt", a, out.const(0.0))),
+    }  # fmt: skip
+    if operator in _COMPARISONS:
+        return _truth(out, _COMPARISONS[operator], *names)
+    if operator in _LIBRARY:
+        return out.library(operator, *names)
+    if operator not in simple:
+        raise NotImplementedError(f"the loop compiler does not know {operator}; rewrite the model without it")
+    return simple[operator](*names)
+
+
+def _truth(out: Assembler, condition: str, a: str, b: str) -> str:
+    return out.select(out.compare(condition, a, b), out.const(1.0), out.const(0.0))
+
+
+def _unit(out: Assembler, a: str) -> str:
+    """1 where a is nonzero, else 0."""
+    return _truth(out, "une", a, out.const(0.0))
