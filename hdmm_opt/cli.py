@@ -7,6 +7,7 @@ to stderr, results to stdout. Heavy libraries are imported inside the verbs.
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,11 @@ from typing import Any
 import click
 
 PROVED, NOT_PROVED, MISUSE, INTERRUPTED = 0, 1, 2, 130
+
+
+# The matrices here are small: threads of the linear algebra only get in the way of the search's own workers.
+for _library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 
 class _Group(click.Group):
@@ -66,28 +72,56 @@ def studies(as_json: bool) -> None:
         click.echo("  ".join(row[key].ljust(width) for key, width in widths.items()) + "  " + row["shows"])
 
 
+def _work(command: Any) -> Any:
+    """The options of verbs that design."""
+    for option in (
+        click.option("--budget", type=click.Choice(["quick", "full"]), default="quick", show_default=True,
+                     help="quick: as the study says; full: 50 x 100 candidates, 1000 random runs, 10000 attacks."),
+        click.option("--resume", is_flag=True, help="Go on with an interrupted job."),
+        click.option("--seed", type=click.IntRange(0), help="Seed of the search; that of the study by default."),
+        click.option("--cluster", metavar="ADDRESS", help='Evaluate on a Dask scheduler, or "local" for one here.'),
+        click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True,
+                     help="Processes for the search, threads for the runs."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+def _options(jobs: int, cluster: str | None, seed: int | None, resume: bool, budget: str) -> Any:
+    from .selection import Options
+
+    return Options(seed=seed, jobs=jobs, full=budget == "full", resume=resume, cluster=cluster)
+
+
 @main.command()
 @click.argument("study")
 @click.option("-o", "output", type=click.Path(path_type=Path), help="Gain file to write; STUDY.gains.json by default.")
 @click.option("--report", type=click.Path(path_type=Path, file_okay=False), help="Folder for an HTML report.")
-@click.option(
-    "--jobs",
-    type=click.IntRange(1, 256),
-    default=1,
-    show_default=True,
-    help="Processes for the search, threads for the runs.",
-)
-@click.option("--seed", type=click.IntRange(0), help="Seed of the search; that of the study by default.")
-@click.option("--resume", is_flag=True, help="Go on with an interrupted search.")
-@click.option("--budget", type=click.Choice(["quick", "full"]), default="quick", show_default=True,
-              help="quick: as the study says; full: 50 x 100 candidates, 1000 random runs, 10000 attacks.")  # fmt: skip
-def design(
-    study: str, output: Path | None, report: Path | None, jobs: int, seed: int | None, resume: bool, budget: str
-) -> None:
+@_work
+def design(study: str, output: Path | None, report: Path | None, **work: Any) -> None:
     """Design gains for STUDY, a bundled name or a TOML file: reference, gains, proof, validation, gain file."""
     from .commands import run_design
 
-    sys.exit(run_design(study, output, report, jobs=jobs, seed=seed, resume=resume, full=budget == "full"))
+    sys.exit(run_design(study, output, report, _options(**work)))
+
+
+@main.command()
+@click.argument("study")
+@click.option(
+    "--vary",
+    "vary",
+    multiple=True,
+    required=True,
+    metavar="KEY=A:B:N",
+    help="A number of the study, such as controller.rate_hz=500:2000:4, or KEY=A,B,C. Several make a grid.",
+)
+@click.option("-o", "output", type=click.Path(path_type=Path), help="Table to write; STUDY.sweep.json by default.")
+@_work
+def sweep(study: str, vary: tuple[str, ...], output: Path | None, **work: Any) -> None:  # fmt: skip
+    """Design STUDY at every point of a grid of its numbers; what is proved where, and with which gains."""
+    from .commands import run_sweep
+
+    sys.exit(run_sweep(study, vary, output, _options(**work)))
 
 
 @main.command()

@@ -27,9 +27,7 @@ from .simulation import ClosedLoop, Fault, Metrics, Run, Scenario, Trace, scenar
 from .state import State
 
 
-def run_design(
-    name: str, output: Path | None, report: Path | None, *, jobs: int, seed: int | None, resume: bool, full: bool
-) -> int:
+def run_design(name: str, output: Path | None, report: Path | None, options: Options) -> int:
     """`hdmm-opt design`."""
     chosen = study.load(name)
     target = Path(f"{chosen.study.name}.gains.json") if output is None else output
@@ -40,9 +38,8 @@ def run_design(
     state = target.with_name(f".{target.name}.state")
     if report is not None:
         _prepare_folder(report)
-    options = Options(seed=seed, jobs=jobs, full=full, state=state, resume=resume)
     with bar() as progress:
-        result = pipeline.design(chosen, options, progress)
+        result = pipeline.design(chosen, replace(options, state=state), progress)
     if result.document is None:
         write_text(rejected, gain_file.to_text(pipeline.rejected_document(chosen, result)))
         state.unlink(missing_ok=True)
@@ -210,6 +207,35 @@ def run_falsify(path: Path, budget: int, seed: int, *, jobs: int = 1, resume: bo
         f"worst {1e3 * late:.4g} mm, worst on record {1e3 * worst:.4g} mm, certified {1e3 * ball:.4g} mm: "
         f"ratio {ball / worst:.3g}; at most {100 * found.largest_use:.3g} % of a limit used"
     )
+    return PROVED
+
+
+def run_sweep(name: str, vary: tuple[str, ...], output: Path | None, options: Options) -> int:
+    """`hdmm-opt sweep`."""
+    from .sweep import SCHEMA, axis, grid, sweep
+
+    chosen = study.load(name)
+    axes = [axis(text) for text in vary]
+    grid(chosen, axes)
+    target = Path(f"{chosen.study.name}.sweep.json") if output is None else output
+    if target.suffix != ".json":
+        raise InvalidInputError(f"the table of a sweep is named .json: got {target}; give -o another name")
+    check_writable(target)
+    with bar() as progress:
+        rows, state = sweep(chosen, axes, replace(options, state=target.with_name(f".{target.name}.state")), progress)
+    document = {"schema": SCHEMA, "study": chosen.model_dump(mode="json", exclude_none=True), "rows": rows}
+    write_text(target, gain_file.to_text(document))
+    state.remove()
+    columns = [a.key for a in axes]
+    click.echo(",".join([*columns, "verdict", "certified_error_m", "simulated_error_m"]))
+    for row in rows:
+        found = [
+            row["verdict"],
+            *("" if row[k] is None else f"{row[k]:.6g}" for k in ("certified_error_m", "simulated_error_m")),
+        ]
+        click.echo(",".join([*(f"{row['values'][key]:g}" for key in columns), *found]))
+    proved = sum(row["verdict"] == "proved" for row in rows)
+    click.echo(f"{proved} of {len(rows)} designs proved; gains and verdicts in {target}", err=True)
     return PROVED
 
 

@@ -79,13 +79,13 @@ class Problem:
         """Indices of the gains that are not fixed."""
         return [i for i, gain in enumerate(self.ranges) if not gain.fixed]
 
-    def gains(self, point: Array) -> tuple[Gains, ...]:
-        """Gains at a point of the unit cube, logarithmic in every range, as decimals of four digits."""
+    def gains(self, point: Array, *, digits: int = 4) -> tuple[Gains, ...]:
+        """Gains at a point of the unit cube, logarithmic in every range, as decimals of so many digits."""
         values = [gain.low for gain in self.ranges]
         for index, share in zip(self.searched, point, strict=True):
             gain = self.ranges[index]
             exact = gain.low * (gain.high / gain.low) ** float(share)
-            values[index] = min(max(float(f"{exact:.4g}"), gain.low), gain.high)
+            values[index] = min(max(float(f"{exact:.{digits}g}"), gain.low), gain.high)
         return tuple(Gains(**dict(zip(KINDS, values[k : k + 4], strict=True))) for k in range(0, len(values), 4))
 
     def point(self, gains: tuple[Gains, ...]) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stability import Composition, Gains, certify, error_rows
-from tuning import Best, Budget, Outcome, Population, Selection, best_of, executor, select
+from tuning import Best, Budget, Outcome, Population, Selection, best_of, select
 from tuning import search as run_search
 from tuning.decimals import rounded, shortest
 
@@ -22,6 +22,7 @@ from .evaluation import evaluate, make_evaluator
 from .problem import KINDS, Problem
 from .proof import certificate, violation
 from .state import State
+from .workers import workers
 
 Array = NDArray[np.float64]
 
@@ -146,9 +147,9 @@ def search(
             now.evaluations / allowed.evaluations, f"best {cost:.4g}" if math.isfinite(cost) else "none proved yet"
         )
 
-    with executor(_make, (problem.study, composed), options.jobs, options.cluster) as workers:
+    with workers(_make, (problem.study, composed), options.jobs, options.cluster) as pool:
         found = run_search(
-            problem.study.tuning.method, workers.map, problem.point(first.gains), population, seed, allowed,
+            problem.study.tuning.method, pool.map, problem.point(first.gains), population, seed, allowed,
             restored=_population(state), after=after,
         )  # fmt: skip
     best, gains = best_of(found), problem.gains(found.points[found.best])

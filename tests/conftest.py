@@ -1,5 +1,6 @@
 import copy
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,10 @@ from stability import Composition, Gains, certify
 # Timing is no property of the code, and a seed that changes is no test.
 settings.register_profile("project", deadline=None, derandomize=True)
 settings.load_profile("project")
+
+# Before the workers start: linear algebra on one thread, as in the command line.
+for library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 GAINS = Path(__file__).parent.parent / "notebooks" / "gains"
 

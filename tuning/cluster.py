@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from .executor import Executor, Make
@@ -46,9 +46,12 @@ class Cluster(Executor):
         self.workers = max(1, sum(self._client.nthreads().values()))
         self._task = (uuid.uuid4().hex, make, arguments)
 
-    def _map(self, batches: list[list[Any]]) -> list[list[Any]]:
-        futures = [self._client.submit(_call, self._task, batch, pure=False, retries=DEATHS) for batch in batches]
-        return self._client.gather(futures)
+    def _completed(self, batches: list[list[Any]]) -> Iterator[tuple[int, list[Any]]]:
+        from distributed import as_completed
+
+        futures = {self._client.submit(_call, self._task, batch, pure=False): k for k, batch in enumerate(batches)}
+        for future, results in as_completed(list(futures), with_results=True):
+            yield futures[future], results
 
     def close(self, *, abandon: bool) -> None:
         """Leave the cluster; end it where it is our own."""

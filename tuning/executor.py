@@ -10,8 +10,8 @@ import os
 import signal
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import active_children, get_context
 from types import TracebackType
@@ -42,14 +42,19 @@ class Executor(ABC):
 
     def map(self, items: Sequence[Any]) -> list[Any]:
         """Results in the order of the items."""
-        size = self.batch_size(len(items))
+        found = dict(self.completed(items))
+        return [found[k] for k in range(len(items))]
+
+    def completed(self, items: Sequence[Any], size: int | None = None) -> Iterator[tuple[int, Any]]:
+        """Results as they come, each with the index of its item; in batches of `size`, or as `batch_size` says."""
+        size = self.batch_size(len(items)) if size is None else size
         batches = [list(items[first : first + size]) for first in range(0, len(items), size)]
         begun = time.perf_counter()
-        results = [result for batch in self._map(batches) for result in batch]
+        for k, results in self._completed(batches):
+            yield from enumerate(results, k * size)
         if items:
             busy = min(self.workers, len(batches))
             self._seconds_an_item = (time.perf_counter() - begun) * busy / len(items)
-        return results
 
     def batch_size(self, items: int) -> int:
         """Items in a batch: enough that hand-over stays a small share, few enough that every worker has some."""
@@ -60,8 +65,8 @@ class Executor(ABC):
         return min(max(even, round(least)), -(-items // self.workers))
 
     @abstractmethod
-    def _map(self, batches: list[list[Any]]) -> list[list[Any]]:
-        """Results of each batch."""
+    def _completed(self, batches: list[list[Any]]) -> Iterator[tuple[int, list[Any]]]:
+        """The index and the results of each batch, as they come."""
 
     def __enter__(self) -> Executor:
         return self
@@ -82,8 +87,9 @@ class Here(Executor):
     def __init__(self, make: Make, arguments: tuple[Any, ...]) -> None:
         self._evaluate = make(*arguments)
 
-    def _map(self, batches: list[list[Any]]) -> list[list[Any]]:
-        return [self._evaluate(batch) for batch in batches]
+    def _completed(self, batches: list[list[Any]]) -> Iterator[tuple[int, list[Any]]]:
+        for k, batch in enumerate(batches):
+            yield k, self._evaluate(batch)
 
     def close(self, *, abandon: bool) -> None:
         """Nothing to free."""
@@ -116,20 +122,21 @@ class Processes(Executor):
                 os.environ.pop(name) if value is None else os.environ.update({name: value})
         return pool
 
-    def _map(self, batches: list[list[Any]]) -> list[list[Any]]:
-        results: dict[int, list[Any]] = {}
+    def _completed(self, batches: list[list[Any]]) -> Iterator[tuple[int, list[Any]]]:
+        missing = set(range(len(batches)))
         for attempt in range(REPLACEMENTS + 1):
-            futures = {k: self._pool.submit(_call, batch) for k, batch in enumerate(batches) if k not in results}
             try:
-                for k, future in futures.items():
-                    results[k] = future.result()
-                break
+                futures = {self._pool.submit(_call, batches[k]): k for k in sorted(missing)}
+                for future in as_completed(futures):
+                    results = future.result()
+                    missing.discard(futures[future])
+                    yield futures[future], results
+                return
             except BrokenProcessPool:
                 if attempt == REPLACEMENTS:
                     raise
                 self._pool.shutdown(wait=True, cancel_futures=True)
                 self._pool = self._open()
-        return [results[k] for k in range(len(batches))]
 
     def close(self, *, abandon: bool) -> None:
         """End the processes."""

@@ -135,7 +135,7 @@ def _solve(at: Callable[[Array, bool], Derivatives], first: Array, slacks: int) 
             "bound_push": 1e-3, "bound_frac": 1e-3, "mu_init": 1e-2, "tol": 1e-5, "acceptable_iter": 3,
             "acceptable_tol": 1e-3,
         },
-        "print_time": False, "error_on_fail": False,
+        "print_time": False, "error_on_fail": False, "show_eval_warnings": False,
     }  # fmt: skip
     solver = ca.nlpsol("descent", "ipopt", {"x": point, "f": both[0], "g": both[1:]}, options)
     solver(x0=first, lbx=0, ubx=1, lbg=0, ubg=ca.inf)

@@ -21,12 +21,15 @@ from ..control import RAC, gain_columns
 from .engine import Batch, Engine
 from .metrics import Metrics, Yardstick, metrics, records
 from .scenario import Scenario
+from .sensitivity import differentiated
 from .system import System, Task
 
 Array = NDArray[np.float64]
 
 #: Longest integration step as a share of the plant's fastest time constant.
 STEP_SHARE = 0.35
+#: Step of the central difference that differentiates the start of a run, as a share of the direction.
+NUDGE = 1e-6
 #: A tracking error beyond this, m, ends a run as diverged.
 DIVERGED = 1.0
 
@@ -156,14 +159,53 @@ class ClosedLoop:
         engine = self.engine(_extras(runs))
         batch = self._batch(runs, reference, duration)
         found = engine.run(batch, jobs=jobs)
+        return self._metrics(engine, found.figures, found.lost, batch.shared.shape[0])
+
+    def _metrics(self, engine: Engine, figures: Array, lost: Array, count: int) -> list[Metrics]:
         names = [record.name for record in engine.system.records]
         return [
-            metrics(
-                dict(zip(names, map(float, column), strict=True)), float(lost), self.yardstick, self.period,
-                batch.shared.shape[0],
-            )
-            for column, lost in zip(found.figures.T, found.lost, strict=True)
+            metrics(dict(zip(names, column, strict=True)), time, self.yardstick, self.period, count)
+            for column, time in zip(figures.T.tolist(), lost.tolist(), strict=True)
+        ]
+
+    def sensitivities(
+        self, runs: Sequence[Run], directions: Array, reference: Reference
+    ) -> tuple[list[Metrics], Array, Array]:
+        """Figures, and the derivatives of RMS error and ITAE along directions of the gains.
+
+        Args:
+            runs: Gains and scenarios.
+            directions: Directions in the space of all gains, in the order of `gain_columns`. Shape (d, 4 k).
+            reference: Followed from t = 0.
+
+        Returns:
+            The figures of each run, and derivatives, each of shape (runs, d). One lane of the differentiated loop for
+            each run and direction. Not guaranteed: at a kink the derivative is that of one side.
+        """
+        engine = self._made.setdefault("derivative", Engine(differentiated(self.system()), compiled=self.compiled))
+        plain, count = self._batch(runs, reference, None), len(directions)
+        each, way = np.repeat(np.arange(len(runs)), count), np.tile(np.arange(count), len(runs))
+        slopes = np.zeros((plain.fixed.shape[0], each.size))
+        slopes[: directions.shape[1]] = directions[way].T
+        start = [
+            self._starts_at(plain.fixed[: directions.shape[1], each] + sign * NUDGE * directions[way].T, runs, each,
+                            plain.shared[0])
+            for sign in (1, -1)
         ]  # fmt: skip
+        batch = Batch(
+            fixed=np.vstack([plain.fixed[:, each], slopes]), seeds=plain.seeds[each],
+            x=np.vstack([plain.x[:, each], (start[0] - start[1]) / (2 * NUDGE)]),
+            z=np.zeros((2 * plain.z.shape[0], each.size)), shared=plain.shared,
+            own=lambda lane, first, size: plain.own(int(each[lane]), first, size),
+        )  # fmt: skip
+        found = engine.run(batch)
+        rows = {
+            record.name: found.figures[i].reshape(len(runs), count) for i, record in enumerate(engine.system.records)
+        }
+        figures = self._metrics(engine, found.figures[:, ::count], found.lost[::count], plain.shared.shape[0])
+        rms = np.array([[m.rms_error_m] for m in figures])
+        late = rows["squares"] / rms**2
+        return figures, rows["d squares"] / (2 * late * rms), rows["d itae"] * self.period
 
     def integration_error(self, gains: tuple[Gains, ...], reference: Reference, scenario: Scenario) -> float:
         """Estimated error of the integration along a run, m: the change of the position when the steps are halved.
@@ -277,11 +319,15 @@ class ClosedLoop:
 
         Shape (n, runs).
         """
-        n, k = len(self.law.plant.states), len(self.law.governed)
-        x = np.zeros((n, len(runs)))
-        x[0] = r[0] + self.initial[0] * np.array([run.scenario.initial for run in runs])
         columns = np.array([np.array(gain_columns(run.gains)).ravel(order="F") for run in runs]).T
-        rest = np.vstack([np.repeat(r[:, None], len(runs), axis=1), np.zeros((k, len(runs)))])
+        return self._starts_at(columns, runs, np.arange(len(runs)), r)
+
+    def _starts_at(self, columns: Array, runs: Sequence[Run], each: NDArray[np.int64], r: Array) -> Array:
+        """The same for other gains, shape (4 k, lanes), of the runs that `each` names. Shape (n, lanes)."""
+        n, k = len(self.law.plant.states), len(self.law.governed)
+        x = np.zeros((n, each.size))
+        x[0] = r[0] + self.initial[0] * np.array([runs[i].scenario.initial for i in each])
+        rest = np.vstack([np.repeat(r[:, None], each.size, axis=1), np.zeros((k, each.size))])
         for i in range(1, n):
             target = np.array(self._law()["targets"](np.vstack([x, rest]), columns))[i]
             x[i] = target + np.clip(-target, -self.initial[i], self.initial[i])
