@@ -125,6 +125,17 @@ def sweep(study: str, vary: tuple[str, ...], output: Path | None, **work: Any) -
 
 
 @main.command()
+@click.argument("study")
+@click.option("-o", "output", type=click.Path(path_type=Path), help="Set to write; STUDY.tradeoff.json by default.")
+@_work
+def tradeoff(study: str, output: Path | None, **work: Any) -> None:
+    """The Pareto set of STUDY's gains: simulated error, certified error, and the share of the limits they use."""
+    from .commands import run_tradeoff
+
+    sys.exit(run_tradeoff(study, output, _options(**work)))
+
+
+@main.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
 @click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
 @click.option("--junit", type=click.Path(path_type=Path), help="Write the verdicts as JUnit XML.")

@@ -229,7 +229,7 @@ def stored(document: dict[str, Any], witness: Witness) -> dict[str, Any]:
     """A gain file's document with the witness as its worst case, where it is worse than the one there."""
     shown = dict(document["validation"])
     late, ball = witness.metrics.maximum_error_m, ball_of(document)
-    shown["falsification_runs"] = shown.get("falsification_runs", 0) + witness.runs
+    shown["simulated_runs"] = shown.get("simulated_runs", 0) + witness.runs
     shown["largest_error_m"] = max(shown["largest_error_m"], witness.largest_error)
     if late >= shown["largest_error_after_transient_m"]:
         scenario = {**asdict(witness.scenario), "load": [list(p) for p in witness.scenario.load]}

@@ -141,26 +141,48 @@ def search(
     composed = isinstance(first.certificate, Composition)
 
     def after(now: Population) -> None:
-        state.put("search", _data(now))
+        state.put("search", to_data(now))
         cost = now.outcomes[now.best].cost
         progress.update(
             now.evaluations / allowed.evaluations, f"best {cost:.4g}" if math.isfinite(cost) else "none proved yet"
         )
 
+    method, start = problem.study.tuning.method, problem.point(first.gains)
+    if method == "gradient":
+        return _descended(problem, start, seed, allowed.evaluations, composed)
     with workers(_make, (problem.study, composed), options.jobs, options.cluster) as pool:
         found = run_search(
-            problem.study.tuning.method, pool.map, problem.point(first.gains), population, seed, allowed,
-            restored=_population(state), after=after,
-        )  # fmt: skip
-    best, gains = best_of(found), problem.gains(found.points[found.best])
+            method, pool.map, start, population, seed, allowed, restored=kept_population(state), after=after
+        )
+    best = best_of(found)
     if best is None:
+        gains = problem.gains(found.points[found.best])
         return Found(gains=gains, best=None, evaluations=found.evaluations, runs=found.runs)
+    return _shortened(problem, best, found.evaluations, found.runs, composed)
+
+
+def _descended(problem: Problem, start: Array, seed: int, evaluations: int, composed: bool) -> Found:
+    """Descent from the start and then from random points, until the budget is used."""
+    from .gradient import descent
+
+    others = np.random.default_rng(seed).uniform(size=(evaluations, start.size))
+    tried, used = descent(problem, [start, *others], evaluations - 1)
+    point = tried[0] if tried else start
+    (outcome,) = evaluate(problem, [problem.gains(point)], composed=composed)
+    if not outcome.feasible:
+        return Found(gains=problem.gains(point), best=None, evaluations=used + 1, runs=outcome.runs)
+    return _shortened(problem, Best(point=point, outcome=outcome), used + 1, outcome.runs, composed)
+
+
+def _shortened(problem: Problem, best: Best, evaluations: int, runs: int, composed: bool) -> Found:
+    """The winner with as few digits as its proof and its cost allow."""
+    gains = problem.gains(best.point)
     choices = [_with_digits(problem, gains, digits) for digits in SHORT_DIGITS]
     short = shortest(choices, lambda some: evaluate(problem, some, composed=composed), best.outcome)
     if short is not None:
         gains = short[0]
         best = Best(point=problem.point(gains), outcome=short[1])
-    return Found(gains=gains, best=best, evaluations=found.evaluations + len(choices), runs=found.runs)
+    return Found(gains=gains, best=best, evaluations=evaluations + len(choices), runs=runs)
 
 
 def _make(study: Any, composed: bool) -> Callable[..., list[Outcome]]:
@@ -175,7 +197,8 @@ def _with_digits(problem: Problem, gains: tuple[Gains, ...], digits: int) -> tup
     return tuple(Gains(**dict(zip(KINDS, values[k : k + 4], strict=True))) for k in range(0, len(values), 4))
 
 
-def _data(state: Population) -> dict[str, Any]:
+def to_data(state: Population) -> dict[str, Any]:
+    """A population as JSON data."""
     return {
         "iteration": state.iteration,
         "points": state.points.tolist(),
@@ -188,7 +211,7 @@ def _data(state: Population) -> dict[str, Any]:
     }
 
 
-def _population(state: State) -> Population | None:
+def kept_population(state: State) -> Population | None:
     """The population that a state holds.
 
     Raises:

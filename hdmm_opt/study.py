@@ -182,7 +182,7 @@ class WeightSection(_Section):
 class TuningSection(_Section):
     """Search budget of the second stage."""
 
-    method: Literal["jaya", "tlbo", "random"] = "jaya"
+    method: Literal["jaya", "tlbo", "random", "gradient"] = "jaya"
     population: Annotated[int, Field(ge=4, le=500)] = 20
     iterations: Annotated[int, Field(ge=0, le=10_000)] = 20
     seconds: Positive | None = None

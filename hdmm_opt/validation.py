@@ -46,7 +46,8 @@ class Validation:
         largest_error: Largest |tracking error| at any time of a run inside the assumptions, m.
         largest_late_error: The same after the transient, m.
         integration_error: Estimated error of the integration on the first scenario, m.
-        missed: Requirements that a run inside the assumptions missed, as text.
+        count: Runs inside the assumptions.
+        missed: Requirements that one of them missed, as text.
     """
 
     runs: tuple[tuple[Scenario, Metrics], ...]
@@ -55,6 +56,7 @@ class Validation:
     largest_error: float
     largest_late_error: float
     integration_error: float
+    count: int
     missed: tuple[str, ...]
 
 
@@ -109,7 +111,7 @@ def validate(
     late = max((m.maximum_error_m for _, m in everything), default=0.0)
     return Validation(
         runs=runs, worst=worst, monte_carlo=drawn, largest_error=largest, largest_late_error=late,
-        integration_error=estimate, missed=tuple(failures),
+        integration_error=estimate, count=len(everything), missed=tuple(failures),
     )  # fmt: skip
 
 
@@ -211,6 +213,7 @@ def to_data(problem: Problem, found: Validation, certificate: Certificate) -> di
         "nominal": [entry(s, m) for s, m in found.runs],
         "worst_case": entry(*found.worst) if found.worst else None,
         "monte_carlo": found.monte_carlo,
+        "simulated_runs": found.count,
         "integration_error_m": found.integration_error,
         "largest_error_m": found.largest_error,
         "largest_error_after_transient_m": found.largest_late_error,
