@@ -24,6 +24,7 @@ from hdmm_opt import study
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Batch, Engine, Record, System, Task, kernel
 from hdmm_opt.simulation.compiler import compiled_text
+from timing import fastest
 
 Array = np.ndarray
 TICKS = 4000
@@ -91,16 +92,6 @@ def batch(case: Case, runs: int) -> Batch:
         x=np.repeat(case.x[:, None], runs, axis=1), z=np.zeros((case.system.sizes["z"], runs)), shared=case.shared,
         own=lambda run, first, size: own[:, first : first + size],
     )  # fmt: skip
-
-
-def fastest(action: Callable[[], object], repeats: int = 7) -> float:
-    action()
-    times = []
-    for _ in range(repeats):
-        begun = time.perf_counter()
-        action()
-        times.append(time.perf_counter() - begun)
-    return min(times)
 
 
 def error_of(case: Case, found: Array) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,20 +20,10 @@ from stability.quadratic import Inclusion, prove, search
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from known_answers import chain_bounds, claim_of, integrator_chain
+from timing import fastest
 
 GAINS = (Gains(beta=24.0), Gains(beta=6000.0))
 FILES = Path(__file__).parents[1] / "notebooks" / "gains"
-
-
-def fastest(action: Callable[[], object], repeats: int = 5) -> float:
-    """Shortest of some runs after one that warms up, s."""
-    action()
-    times = []
-    for _ in range(repeats):
-        begun = time.perf_counter()
-        action()
-        times.append(time.perf_counter() - begun)
-    return min(times)
 
 
 def chain(order: int) -> Callable[[], object]:

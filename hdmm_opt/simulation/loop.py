@@ -18,11 +18,12 @@ from stability import Gains
 from trajectories import Reference
 
 from ..control import RAC, gain_columns
+from .compose import compose
 from .engine import Batch, Engine
-from .metrics import Metrics, Yardstick, metrics, records
+from .metrics import Metrics, Yardstick, metrics
 from .scenario import Scenario
 from .sensitivity import differentiated
-from .system import System, Task
+from .system import System
 
 Array = NDArray[np.float64]
 
@@ -231,49 +232,10 @@ class ClosedLoop:
         return self._made[extras]
 
     def system(self, extras: frozenset[str] = frozenset()) -> System:
-        """The loop as symbols.
-
-        Discrete states are the adaptive scalars, the commanded input, the errors, and the input that a faulty actuator
-        applies. A fault leaves ``(1 - a(t)) u + a(t) u_stuck`` with ``a = share (1 - exp(-rate (t - start)))`` from
-        its start on (Heydari Shahna 2025, P-3).
-        """
-        import casadi as ca
-
-        law, plant = self.law, self.law.plant
-        n, k, m = len(plant.states), len(law.governed), len(plant.inputs)
-        z, r, t, tau = ca.SX.sym("z", 2 * k + 2 * m), ca.SX.sym("r", 4), ca.SX.sym("t"), ca.SX.sym("tau")
-        gains, parameters = ca.SX.sym("gains", 4 * k), plant.p
-        noisy = [i for i, bound in enumerate(self.noise) if bound > 0]
-        draws, spread, offset = (ca.SX.sym(name, len(noisy)) for name in ("draws", "spread", "offset"))
-        grid, fault = ca.SX.sym("grid", n), ca.SX.sym("fault", 3 + m)
-        measured = ca.vertcat(*(
-            plant.x[i] + (spread[noisy.index(i)] * draws[noisy.index(i)] + offset[noisy.index(i)] if i in noisy else 0)
-            for i in range(n)
-        ))  # fmt: skip
-        if "quantisation" in extras:
-            measured = ca.vertcat(*(
-                ca.if_else(grid[i] > 0, grid[i] * ca.floor(measured[i] / grid[i] + 0.5), measured[i]) for i in range(n)
-            ))  # fmt: skip
-        u, theta, q = law.step(
-            measured, r, z[:k], ca.reshape(gains, k, 4), ca.DM(list(plant.values().values())),
-            ca.DM([self.nominal_load]), self.period,
-        )  # fmt: skip
-        applied = u
-        if "fault" in extras:
-            a = ca.if_else(t >= fault[1], fault[0] * (1 - ca.exp(-fault[2] * (t - fault[1]))), 0)
-            applied = (1 - a) * u + a * fault[3:]
-        now, acting = z[k : k + m], z[2 * k + m :]
-        outputs = {name: ca.substitute([value], [plant.u], [acting])[0] for name, value in plant.outputs.items()}
-        return System(
-            x=plant.x, z=z, shared=r, own=plant.w, draws=draws,
-            fixed=ca.vertcat(gains, parameters, spread, offset, grid, fault), t=t, tau=tau,
-            tasks=(Task(every=1, after=ca.vertcat(theta, u, q, applied)),),
-            rate=ca.substitute([plant.rate], [plant.u], [acting])[0],
-            alive=ca.fabs(plant.x[0] - r[0]) < DIVERGED,
-            records=records(plant, self.yardstick, plant.x, now, r, outputs, t, tau),
-            signals={"x": plant.x, "u": now, "q": z[k + m : 2 * k + m], "theta": z[:k], **outputs},
-            period=self.period, substeps=self.substeps(),
-        )  # fmt: skip
+        """The loop as symbols; see `compose.py`."""
+        return compose(
+            self.law, self.yardstick, self.noise, self.nominal_load, self.period, self.substeps(), DIVERGED, extras
+        )
 
     def _times(self, count: int) -> Array:
         return np.asarray(self.period * np.arange(count), dtype=np.float64)
