@@ -13,12 +13,12 @@ from tuning import Outcome
 
 from .problem import Problem, assemble
 from .proof import certificate, slacks, violation
-from .simulation import Metrics, Run, scenarios
+from .simulation import Metrics, Run, Scenario, scenarios
 from .study import Study
 
 Array = NDArray[np.float64]
 
-#: Scenarios of the study that enter the cost of a candidate: the first ones, with their own noise for every candidate.
+#: So many scenarios of the study enter the cost of a candidate, each with the same noise for every candidate.
 COST_SCENARIOS = 4
 
 #: Objectives of a Pareto set: RMS error over the required error, certified bound over it, share of the limits used.
@@ -40,7 +40,7 @@ def evaluate(problem: Problem, candidates: Sequence[tuple[Gains, ...]], *, compo
     """The outcomes of some gains; infeasible ones are never simulated, the others together."""
     found = [find(problem, gains, composed=composed) for gains in candidates]
     excess = [violation(problem, entry, gains) for entry, gains in zip(found, candidates, strict=True)]
-    chosen = scenarios(problem.study)[:COST_SCENARIOS]
+    chosen = cost_scenarios(problem)
     proved = [i for i, entry in enumerate(found) if isinstance(entry, Certificate) and not excess[i] > 0]
     runs = [Run(gains=candidates[i], scenario=scenario) for i in proved for scenario in chosen]
     shown = problem.loop.figures(runs, problem.reference)
@@ -50,6 +50,11 @@ def evaluate(problem: Problem, candidates: Sequence[tuple[Gains, ...]], *, compo
         assert isinstance(entry, Certificate)
         outcomes[i] = outcome(problem, entry, shown[k * len(chosen) : (k + 1) * len(chosen)])
     return outcomes
+
+
+def cost_scenarios(problem: Problem) -> list[Scenario]:
+    """The study's first scenarios without a fault."""
+    return [s for s in scenarios(problem.study) if s.covered][:COST_SCENARIOS]
 
 
 def find(problem: Problem, gains: tuple[Gains, ...], *, composed: bool = False) -> Certificate | Failure:
@@ -65,7 +70,7 @@ def outcome(problem: Problem, found: Certificate, shown: Sequence[Metrics]) -> O
     if any(m.diverged for m in shown):
         return Outcome(violation=0.0, cost=math.inf, runs=len(shown))
     cost = certified_cost(problem, found) + simulated_cost(problem, shown)
-    rms = sum(m.rms_error_m for m in shown) / len(shown)
+    rms = sum(m.rms_error_m for m in shown) / max(len(shown), 1)
     objectives = (rms / required, float(found.ball[0]) / required, effort(problem, found))
     return Outcome(violation=0.0, cost=cost, objectives=objectives, runs=len(shown))
 
@@ -84,7 +89,7 @@ def effort(problem: Problem, found: Certificate) -> float:
 def simulated_cost(problem: Problem, shown: Sequence[Metrics]) -> float:
     """Weighted RMS error and ITAE, relative to what the required error gives, mean over the runs."""
     rms, itae = cost_scales(problem)
-    return sum(rms * m.rms_error_m + itae * m.itae for m in shown) / len(shown)
+    return sum(rms * m.rms_error_m + itae * m.itae for m in shown) / max(len(shown), 1)
 
 
 def cost_scales(problem: Problem) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from stability import Gains
 
+from .errors import InvalidInputError
 from .problem import Problem
 from .simulation import Metrics, Run, Scenario
 from .state import State
@@ -122,6 +123,10 @@ class _Attack:
             self.state.put("falsify", self.answers, often=True)
         answers = self.answers[self.asked]
         self.asked += 1
+        if len(answers) != len(tried) or not all(len(answer) == 3 for answer in answers):
+            raise InvalidInputError(
+                f"{self.state.path}: not a state of this falsification; delete it or leave out --resume"
+            )
         for scenario, (late, largest, use) in zip(tried, answers, strict=True):
             self.largest, self.use = max(self.largest, largest), max(self.use, use)
             if self.worst is None or late > self.worst[1]:
@@ -135,8 +140,10 @@ class _Attack:
         """Loads of simple shapes, then the sign of each parameter by its own effect, then all together."""
         limit = max(2, int(STRUCTURED * self.budget))
         make = partial(Scenario, name="falsified", noise=1.0, initial=1.0, seed=self.seed)
-        left = min(limit - 2 * len(self.names) - 4, self.budget - self.runs)
-        shapes = self._loads()[: max(1, left)]
+        left = self.budget - self.runs
+        if left < 1:
+            return
+        shapes = self._loads()[: max(1, min(limit - 2 * len(self.names) - 4, left))]
         errors = self.errors([make(load=points) for points in shapes])
         load = shapes[int(np.argmax(errors))]
         names = self.names[: max(0, (limit - self.runs) // 2)]
@@ -163,7 +170,7 @@ class _Attack:
     def evolve(self) -> None:
         """CMA-ES from the worst of the structured runs, in the unit cube, until the budget is used."""
         left = self.budget - self.runs
-        if left < 4 or self.worst is None:
+        if left < 1 or self.worst is None:
             return
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -176,8 +183,11 @@ class _Attack:
             size = SMALL if self.budget < LARGE_BUDGET else LARGE
             options = {"bounds": [0, 1], "seed": self.seed + 1, "verbose": -9, "maxfevals": left, "popsize": size}
             search = cma.CMAEvolutionStrategy(first, 0.25, options)
-            while self.runs + size <= self.budget:
+            while self.runs < self.budget:
                 points = search.ask()
+                if self.runs + size > self.budget:
+                    self.errors([self._scenario(np.asarray(p)) for p in points[: self.budget - self.runs]])
+                    break
                 search.tell(points, [-e for e in self.errors([self._scenario(np.asarray(p)) for p in points])])
 
     def _scenario(self, point: Array) -> Scenario:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +16,10 @@ from numpy.typing import NDArray
 from stability import Certificate, Failure, Gains
 from tuning import Derivatives, descend
 
-from .evaluation import COST_SCENARIOS, certified_cost, cost_scales, find, simulated_cost
+from .evaluation import certified_cost, cost_scales, cost_scenarios, find, simulated_cost
 from .problem import KINDS, Problem
 from .proof import HEADROOM, slacks
-from .simulation import Run, scenarios
+from .simulation import Run
 
 Array = NDArray[np.float64]
 
@@ -54,14 +55,19 @@ def derivatives(problem: Problem, point: Array, wanted: bool) -> Derivatives:
     found = find(problem, gains)
     if isinstance(found, Failure):
         return nothing
-    runs = [Run(gains=gains, scenario=s) for s in scenarios(problem.study)[:COST_SCENARIOS]]
+    runs = [Run(gains=gains, scenario=s) for s in cost_scenarios(problem)]
+    shown = problem.loop.figures(runs, problem.reference)
+    if any(m.diverged for m in shown):
+        return nothing
     certified, room = certified_cost(problem, found), _room(problem, found, gains)
+    cost = certified + simulated_cost(problem, shown)
     if not wanted:
-        cost = certified + simulated_cost(problem, problem.loop.figures(runs, problem.reference))
         return Derivatives(cost=cost, gradient=nothing.gradient, slacks=room, jacobian=nothing.jacobian, evaluations=1)
-    shown, rms, itae = problem.loop.sensitivities(runs, _directions(problem, gains), problem.reference)
+    # an encoder's rounding has no useful derivative: the slope is that of the loop without it
+    smooth = [replace(run, scenario=replace(run.scenario, quantisation=0.0)) for run in runs]
+    _, rms, itae = problem.loop.sensitivities(smooth, _directions(problem, gains), problem.reference)
     scales = cost_scales(problem)
-    gradient = (scales[0] * rms + scales[1] * itae).sum(axis=0) / len(runs)
+    gradient = (scales[0] * rms + scales[1] * itae).sum(axis=0) / max(len(runs), 1)
     jacobian = np.zeros((count, size))
     for i in range(size):
         step = STEP if point[i] + STEP <= 1 else -STEP
@@ -71,7 +77,7 @@ def derivatives(problem: Problem, point: Array, wanted: bool) -> Derivatives:
             gradient[i] += (certified_cost(problem, moved) - certified) / step
             jacobian[:, i] = (_room(problem, moved, moved_gains) - room) / step
     return Derivatives(
-        cost=certified + simulated_cost(problem, shown), gradient=gradient, slacks=room, jacobian=jacobian,
+        cost=cost, gradient=gradient, slacks=room, jacobian=jacobian,
         evaluations=1 + size,
     )  # fmt: skip
 

@@ -113,6 +113,13 @@ def assemble(study: Study, reference: Reference | None = None) -> Problem:
         law = RAC(plant=plant, modelling=study.controller.modelling)
     except ValueError as error:
         raise InvalidInputError(f"controller: {error}") from None
+    for scenario in study.validation.scenarios:
+        stuck = scenario.fault.stuck if scenario.fault else ()
+        if len(stuck) > len(plant.inputs):
+            raise InvalidInputError(
+                f"validation.scenarios.{scenario.name}.fault.stuck has at most one entry for each of "
+                f"{', '.join(plant.inputs)}: got {len(stuck)}; remove what is too much"
+            )
     noise = _by_state("uncertainty.noise", study.uncertainty.noise, plant)
     initial = _by_state("uncertainty.initial", study.uncertainty.initial, plant)
     ranges = _ranges(study, law)

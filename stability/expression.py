@@ -159,8 +159,12 @@ def straight_line(function: Any, names: tuple[str, ...]) -> Expression:
     """
     import casadi as ca
 
-    if function.n_in() != 1 or function.n_out() != 1 or function.numel_in(0) != len(names):
-        raise ValueError(f"one input vector with {len(names)} named elements is needed: got {function}")
+    dense = function.n_in() == 1 and function.nnz_in(0) == function.numel_in(0) == len(names)
+    if not dense or function.n_out() != 1:
+        raise ValueError(f"one dense input vector with {len(names)} named elements is needed: got {function}")
+    # an output instruction counts the nonzeros of the output, column by column
+    row, column = function.sparsity_out(0).get_triplet()
+    places = [i + j * function.size1_out(0) for i, j in zip(row, column, strict=True)]
     known = _casadi_operators(ca)
     builder = _Builder()
     work: dict[int, int] = {}
@@ -173,7 +177,7 @@ def straight_line(function: Any, names: tuple[str, ...]) -> Expression:
         elif code == ca.OP_CONST:
             work[targets[0]] = builder.const(function.instruction_constant(k))
         elif code == ca.OP_OUTPUT:
-            results[targets[1]] = work[sources[0]]
+            results[places[targets[1]]] = work[sources[0]]
         elif code in known:
             work[targets[0]] = known[code](builder, *(work[i] for i in sources))
         else:

@@ -88,19 +88,27 @@ class _Compiler:
         for task in system.tasks:
             self._task(task.every, task.after, known, z)
         known |= {f"z{i}": self.read(box) for i, box in enumerate(z)}
-        (sound,) = self.values(system.alive, known)
-        stamp, before = known["t0"], self.read(lost)
-        failed = out.compare("oeq", sound, out.const(0.0))
-        first = out.select(out.compare("olt", before, stamp), before, stamp)
-        now = out.select(failed, first, before)
-        self.keep(lost, now)
-        alive = out.compare("oeq", now, out.const(float("inf")))
+        alive = self._judge(known, lost, known["t0"])
         if self.trace:
             rows = [value for column in system.signals.values() for value in self.values(column, known)]
             for i, value in enumerate(rows):
                 self.store("%trace", i, value, rows=len(rows))
         self._record(known, figures, alive, lambda record: True)
         self._steps(known, x, figures, alive)
+        end = out.const(system.period)
+        after = {f"x{i}": self.read(box) for i, box in enumerate(x)}
+        self._judge(known | after | {"d0": end}, lost, out.add(known["t0"], end))
+
+    def _judge(self, known: Mapping[str, str], lost: str, stamp: str) -> str:
+        """Note the first time at which a run is not sound; whether it has always been."""
+        out = self.out
+        (sound,) = self.values(self.system.alive, known)
+        before = self.read(lost)
+        failed = out.compare("ueq", sound, out.const(0.0))
+        first = out.select(out.compare("olt", before, stamp), before, stamp)
+        now = out.select(failed, first, before)
+        self.keep(lost, now)
+        return out.compare("oeq", now, out.const(float("inf")))
 
     def _task(self, every: int, after: Any, known: dict[str, str], z: list[str]) -> None:
         out = self.out
@@ -226,8 +234,9 @@ class _Compiler:
 def _inline(out: Assembler, program: Expression, known: Mapping[str, str]) -> list[str]:
     """Write a straight-line program.
 
-    Products that are used once are fused into sums, and a division by what is known sooner than the dividend becomes a
-    product with the reciprocal, which then leaves the loop.
+    A product that is used once is fused into a sum, unless the other term is a product too: a² - b² stays zero where
+    a = b. A division by what is constant in a run becomes a product with the reciprocal, which leaves the loops, and a
+    correction, so that it is rounded like the division.
     """
     operations = program.operations
     uses = [0] * len(operations)
@@ -240,11 +249,17 @@ def _inline(out: Assembler, program: Expression, known: Mapping[str, str]) -> li
     names: list[str] = []
     levels: list[int] = []
 
-    def product(index: int) -> tuple[str, str] | None:
-        operator, *arguments = operations[index]
-        if operator not in ("mul", "sq") or uses[index] > 1:
+    def fused(operator: str, first: int, second: int) -> str | None:
+        if operator not in ("add", "sub") or (_product(operations, first) and _product(operations, second)):
             return None
-        return names[arguments[0]], names[arguments[-1]]
+        for index, other in ((second, first), (first, second)):
+            kind, *factors = operations[index]
+            if kind in ("mul", "sq") and uses[index] == 1:
+                a, b, c = names[factors[0]], names[factors[-1]], names[other]
+                if operator == "sub" and index == second:
+                    return out.fma(out.neg(a), b, c)
+                return out.fma(a, b, out.neg(c) if operator == "sub" else c)
+        return None
 
     for operator, *arguments in operations:
         if operator == "input":
@@ -256,27 +271,21 @@ def _inline(out: Assembler, program: Expression, known: Mapping[str, str]) -> li
             levels.append(0)
             continue
         levels.append(max((levels[i] for i in arguments), default=0))
-        fused = _fused(out, operator, [names[i] for i in arguments], [product(i) for i in arguments])
-        if fused is not None:
-            names.append(fused)
-        elif operator == "div" and levels[arguments[1]] < levels[arguments[0]]:
-            inverse = out.div(out.const(1.0), names[arguments[1]])
-            names.append(out.mul(names[arguments[0]], inverse))
+        given = [names[i] for i in arguments]
+        whole = fused(operator, arguments[0], arguments[1]) if len(arguments) == 2 else None
+        if whole is not None:
+            names.append(whole)
+        elif operator == "div" and levels[arguments[1]] == _LEVEL["f"] < levels[arguments[0]]:
+            names.append(out.quotient(*given))
         else:
-            names.append(_operation(out, operator, [names[i] for i in arguments]))
+            names.append(_operation(out, operator, given))
     return [names[index] for index in program.outputs]
 
 
-def _fused(out: Assembler, operator: str, names: list[str], products: list[tuple[str, str] | None]) -> str | None:
-    if operator not in ("add", "sub"):
-        return None
-    first, second = products
-    if second is not None:
-        a, b = second
-        return out.fma(out.neg(a) if operator == "sub" else a, b, names[0])
-    if first is not None:
-        return out.fma(*first, out.neg(names[1]) if operator == "sub" else names[1])
-    return None
+def _product(operations: tuple[tuple[Any, ...], ...], index: int) -> bool:
+    """Whether a value is a product, with or without a sign."""
+    operator, *arguments = operations[index]
+    return operator in ("mul", "sq") or (operator == "neg" and _product(operations, arguments[0]))
 
 
 def _operation(out: Assembler, operator: str, names: list[str]) -> str:
@@ -287,13 +296,12 @@ def _operation(out: Assembler, operator: str, names: list[str]) -> str:
         "floor": lambda a: out.intrinsic("floor", a), "ceil": lambda a: out.intrinsic("ceil", a),
         "copysign": lambda a, b: out.intrinsic("copysign", a, b),
         "exp": out.exp, "tanh": out.tanh, "sin": out.sin, "cos": out.cos,
-        "min": lambda a, b: out.select(out.compare("olt", a, b), a, b),
-        "max": lambda a, b: out.select(out.compare("ogt", a, b), a, b),
+        "min": lambda a, b: out.intrinsic("minnum", a, b), "max": lambda a, b: out.intrinsic("maxnum", a, b),
         "not": lambda a: _truth(out, "oeq", a, out.const(0.0)),
         "and": lambda a, b: _truth(out, "une", out.mul(_unit(out, a), _unit(out, b)), out.const(0.0)),
         "or": lambda a, b: _truth(out, "une", out.add(_unit(out, a), _unit(out, b)), out.const(0.0)),
         "if_else_zero": lambda c, a: out.select(out.compare("une", c, out.const(0.0)), a, out.const(0.0)),
-        "sign": lambda a: out.sub(_truth(out, "ogt", a, out.const(0.0)), _truth(out, "olt", a, out.const(0.0))),
+        "sign": out.sign,
     }  # fmt: skip
     if operator in _COMPARISONS:
         return _truth(out, _COMPARISONS[operator], *names)

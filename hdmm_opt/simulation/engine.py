@@ -82,8 +82,14 @@ class Engine:
             trace: Whether to keep the signals.
             jobs: Threads.
             lanes: Runs in one group; chosen by the processor's registers where None.
+
+        Raises:
+            ValueError: an array whose shape does not fit.
         """
+        batch = self._checked(batch)
         count, runs = batch.shared.shape[0], batch.seeds.size
+        if lanes is not None and lanes < 1:
+            raise ValueError(f"a group has at least one lane: got {lanes}")
         rows = sum(value.numel() for value in self.system.signals.values()) if trace else 0
         kept = np.empty((count if trace else 0, rows, runs))
         groups = [
@@ -98,9 +104,25 @@ class Engine:
                 cells = list(pool.map(one, groups))
         else:
             cells = [one(group) for group in groups]
-        after = np.hstack(cells)
         held = self.system.sizes["x"] + self.system.sizes["z"]
+        after = np.hstack([np.zeros((held + 1 + len(self.system.records), 0)), *cells])
         return Outcome(figures=after[held + 1 :], lost=after[held], trace=kept)
+
+    def _checked(self, batch: Batch) -> Batch:
+        """The batch with arrays as the kernels read them.
+
+        Raises:
+            ValueError: an array whose shape does not fit the system or the number of runs.
+        """
+        sizes, runs = self.system.sizes, batch.seeds.size
+        wanted = {"fixed": (sizes["f"], runs), "x": (sizes["x"], runs), "z": (sizes["z"], runs),
+                  "shared": (batch.shared.shape[0], sizes["s"])}  # fmt: skip
+        arrays = {name: np.ascontiguousarray(getattr(batch, name), dtype=np.float64) for name in wanted}
+        for name, shape in wanted.items():
+            if arrays[name].shape != shape:
+                raise ValueError(f"{name} of a batch has the shape {shape}: got {arrays[name].shape}")
+        seeds = np.ascontiguousarray(batch.seeds, dtype=np.uint64).ravel()
+        return Batch(**arrays, seeds=seeds, own=batch.own)
 
     def kernel(self, lanes: int, *, trace: bool) -> Callable[..., None]:
         """The function that moves a group; made at its first use."""
@@ -142,7 +164,10 @@ class Engine:
             size = min(CHUNK, count - first)
             own = np.zeros((size, sizes["l"], lanes))
             for lane, run in enumerate(group):
-                own[:, :, lane] = batch.own(run, first, size).T
+                columns = batch.own(run, first, size)
+                if columns.shape != (sizes["l"], size):
+                    raise ValueError(f"own columns have the shape {(sizes['l'], size)}: got {columns.shape}")
+                own[:, :, lane] = columns.T
             own[:, :, len(group) :] = own[:, :, len(group) - 1, None]
             shared = np.ascontiguousarray(batch.shared[first : first + size])
             rows = np.zeros((size, kept.shape[1], lanes)) if kept is not None else np.zeros((0, 0, 0))

@@ -1,7 +1,8 @@
 """LLVM instructions on vectors of lanes: a small assembler, and transcendental functions without branches.
 
 Every operation is IEEE 754 double precision, and multiply-adds are fused only where they are asked for. The result in a
-lane therefore depends on neither the number of lanes nor the machine.
+lane therefore does not depend on the number of lanes, and only through `library`, the C library's functions, on the
+machine. The sign of a zero may differ from that of the C library.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ _LN2 = (math.log(2.0), 2.3190468138462996e-17)
 _HALF_PI = (math.pi / 2, 6.123233995736766e-17)
 #: tanh is 1 in double precision from here on.
 _TANH_END = 20.0
-#: exp saturates at e^±708: the last powers of two are left out.
-_EXP_END = 708.0
+#: Where exp is no normal number any more, and where it is infinite.
+_EXP_END = (-708.0, math.log(1.7976931348623157e308))
+#: The reduction of angles is exact as far as this; sin and cos are NaN beyond.
+_ANGLE_END = 1e12
 
 
 class Assembler:
@@ -155,45 +158,57 @@ class Assembler:
             x = self.mul(x, x)
         return terms[0]
 
-    def limited(self, x: str, end: float) -> str:
-        """X inside ±end; NaN stays NaN."""
-        high, low = self.const(end), self.const(-end)
-        x = self.select(self.compare("ogt", x, high), high, x)
-        return self.select(self.compare("olt", x, low), low, x)
+    def quotient(self, a: str, b: str) -> str:
+        """A / b from the reciprocal of b, for a divisor that is the same for many dividends.
 
-    def _power_of_two(self, x: str) -> tuple[str, str, str]:
-        """2^k, e^r - 1 with x = k ln 2 + r, and k."""
+        Rounded like a division wherever 1 / b is a normal number (Markstein 1990).
+        """
+        inverse = self.div(self.const(1.0), b)
+        first = self.mul(a, inverse)
+        better = self.fma(self.fma(self.neg(first), b, a), inverse, first)
+        finite = self.compare("olt", self.intrinsic("fabs", first), self.const(float("inf")))
+        return self.select(finite, better, first)
+
+    def sign(self, x: str) -> str:
+        """-1, 1, or x itself where it is zero or NaN."""
+        negative = self.select(self.compare("olt", x, self.const(0.0)), self.const(-1.0), x)
+        return self.select(self.compare("ogt", x, self.const(0.0)), self.const(1.0), negative)
+
+    def _power_of_two(self, x: str, bias: int) -> tuple[str, str]:
+        """2^(k + bias - 1023) and e^r - 1 with x = k ln 2 + r."""
         magic = self.const(_ROUND)
         shifted = self.fma(x, self.const(1 / _LN2[0]), magic)
         k = self.sub(shifted, magic)
         r = self.fma(k, self.const(-_LN2[0]), x)
         r = self.fma(k, self.const(-_LN2[1]), r)
-        # the low bits of `shifted` hold k: moved to the exponent of 1.0
+        # the low bits of `shifted` hold k: moved to the place of the exponent
         moved = self.integer("shl", self.as_bits(shifted), self.bits(52))
-        scale = self.as_real(self.integer("add", moved, self.bits(0x3FF << 52)))
+        scale = self.as_real(self.integer("add", moved, self.bits(bias << 52)))
         series = self.polynomial(r, [1 / math.factorial(n) for n in range(2, 14)])
-        return scale, self.fma(self.mul(r, r), series, r), k
+        return scale, self.fma(self.mul(r, r), series, r)
 
     def exp(self, x: str) -> str:
-        """Within 2e-15, relative; saturated at e^±708."""
-        scale, rest, _ = self._power_of_two(self.limited(x, _EXP_END))
-        return self.fma(scale, rest, scale)
+        """Within 2e-15, relative; 0 below -708, where it is no normal number any more, infinite beyond 709.78."""
+        scale, rest = self._power_of_two(x, 0x3FE)
+        value = self.mul(self.fma(scale, rest, scale), self.const(2.0))
+        value = self.select(self.compare("ogt", x, self.const(_EXP_END[1])), self.const(math.inf), value)
+        return self.select(self.compare("olt", x, self.const(_EXP_END[0])), self.const(0.0), value)
 
     def tanh(self, x: str) -> str:
         """Within 2e-15, relative: (e^2|x| - 1) / (e^2|x| + 1) with the difference kept exact near 0."""
         size = self.intrinsic("fabs", x)
         end = self.const(_TANH_END)
         size = self.select(self.compare("ogt", size, end), end, size)
-        scale, rest, _ = self._power_of_two(self.add(size, size))
+        scale, rest = self._power_of_two(self.add(size, size), 0x3FF)
         less_one = self.fma(scale, rest, self.sub(scale, self.const(1.0)))
         return self.intrinsic("copysign", self.div(less_one, self.add(less_one, self.const(2.0))), x)
 
     def sin(self, x: str) -> str:
-        """Within 2e-15, absolute, for |x| < 1e5; less exact beyond."""
+        """Within 2e-15, absolute; NaN for |x| beyond 1e12."""
         return self._circular(x, 0)
 
     def cos(self, x: str) -> str:
-        """Within 2e-15, absolute, for |x| < 1e5; less exact beyond."""
+        """Within 2e-15, absolute; NaN for |x| beyond 1e12."""
         return self._circular(x, 1)
 
     def _circular(self, x: str, quarter: int) -> str:
@@ -215,7 +230,9 @@ class Assembler:
         swap = self.emit(f"icmp ne {self.whole} {odd_turn}, {self.bits(0)}")
         value = self.select(swap, cosine, sine)
         sign = self.integer("and", self.integer("shl", turn, self.bits(62)), self.bits(1 << 63))
-        return self.as_real(self.integer("xor", self.as_bits(value), sign))
+        value = self.as_real(self.integer("xor", self.as_bits(value), sign))
+        inside = self.compare("ole", self.intrinsic("fabs", x), self.const(_ANGLE_END))
+        return self.select(inside, value, self.const(math.nan))
 
     def mixed(self, seed: str, counter: str) -> str:
         """64 random bits from a seed and a counter: SplitMix64 (Steele, Lea and Flood 2014)."""

@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: How code is made; part of its name in the cache.
+_OPTIONS = "O2, no loop or SLP vectorisation, no unrolling, whole registers"
+
 #: Environment variable that names another cache folder; empty keeps nothing on disk.
 CACHE_VARIABLE = "HDMM_OPT_CACHE"
 
@@ -48,7 +51,7 @@ class Kernel:
         import llvmlite.binding as llvm
 
         machine, features, processor = _target()
-        seal = "\n".join((text, processor, features, str(llvm.llvm_version_info)))
+        seal = "\n".join((text, processor, features, llvm.get_process_triple(), str(llvm.llvm_version_info), _OPTIONS))
         key = hashlib.sha256(seal.encode()).hexdigest()
         code = _cached(key)
         if code is None:
@@ -67,8 +70,9 @@ class Kernel:
     ) -> None:  # fmt: skip
         """Move all lanes over ticks ``first … first + count - 1``; `state` and `trace` are written."""
         arrays = (shared, own, fixed, seeds, state, trace)
-        if not all(a.flags.c_contiguous for a in arrays):
-            raise ValueError("a kernel takes contiguous arrays")
+        kinds = (np.float64, np.float64, np.float64, np.uint64, np.float64, np.float64)
+        if count < 1 or not all(a.flags.c_contiguous and a.dtype == k for a, k in zip(arrays, kinds, strict=True)):
+            raise ValueError(f"a kernel takes contiguous arrays of doubles, and at least one tick: got {count}")
         self._run(first, count, *(a.ctypes.data for a in arrays))
 
 
@@ -110,7 +114,10 @@ def _folder() -> Path | None:
     if chosen is not None:
         return Path(chosen) if chosen else None
     home = os.environ.get("XDG_CACHE_HOME")
-    return (Path(home) if home else Path.home() / ".cache") / "hdmm-opt"
+    try:
+        return (Path(home) if home else Path.home() / ".cache") / "hdmm-opt"
+    except RuntimeError:  # a user without a home
+        return None
 
 
 def _cached(key: str) -> bytes | None:
@@ -131,8 +138,11 @@ def _keep(key: str, code: bytes) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         handle, temporary = tempfile.mkstemp(dir=folder)
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(hashlib.sha256(code).digest() + code)
-        Path(temporary).replace(folder / f"{key}.o")
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                stream.write(hashlib.sha256(code).digest() + code)
+            Path(temporary).replace(folder / f"{key}.o")
+        finally:
+            Path(temporary).unlink(missing_ok=True)
     except OSError:
         return

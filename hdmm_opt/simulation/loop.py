@@ -75,7 +75,7 @@ class Run:
     scenario: Scenario
 
 
-@dataclass
+@dataclass(frozen=True)
 class ClosedLoop:
     """A plant under a law at a control period; compiled once, run with any gains, parameters and scenario.
 
@@ -126,7 +126,7 @@ class ClosedLoop:
             The run. A diverged run is shorter and says so.
         """
         runs = [Run(gains=gains, scenario=scenario)]
-        engine = self.engine(_extras(runs))
+        engine = self.engine(_extras(runs[0]))
         batch = self._batch(runs, reference, duration)
         found = engine.run(batch, trace=True)
         lost = float(found.lost[0])
@@ -155,12 +155,13 @@ class ClosedLoop:
         Returns:
             The figures in the order of the runs.
         """
-        if not runs:
-            return []
-        engine = self.engine(_extras(runs))
-        batch = self._batch(runs, reference, duration)
-        found = engine.run(batch, jobs=jobs)
-        return self._metrics(engine, found.figures, found.lost, batch.shared.shape[0])
+        figures: dict[int, Metrics] = {}
+        for extras in dict.fromkeys(_extras(run) for run in runs):
+            chosen = [k for k, run in enumerate(runs) if _extras(run) == extras]
+            engine, batch = self.engine(extras), self._batch([runs[k] for k in chosen], reference, duration)
+            found = engine.run(batch, jobs=jobs)
+            figures |= zip(chosen, self._metrics(engine, found.figures, found.lost, batch.shared.shape[0]), strict=True)
+        return [figures[k] for k in range(len(runs))]
 
     def _metrics(self, engine: Engine, figures: Array, lost: Array, count: int) -> list[Metrics]:
         names = [record.name for record in engine.system.records]
@@ -182,7 +183,14 @@ class ClosedLoop:
         Returns:
             The figures of each run, and derivatives, each of shape (runs, d). One lane of the differentiated loop for
             each run and direction. Not guaranteed: at a kink the derivative is that of one side.
+
+        Raises:
+            ValueError: a scenario with a fault or with quantisation, which has no useful derivative.
         """
+        if any(_extras(run) for run in runs):
+            raise ValueError(
+                "a loop is differentiated without faults and without quantisation: got a scenario with them"
+            )
         engine = self._made.setdefault("derivative", Engine(differentiated(self.system()), compiled=self.compiled))
         plain, count = self._batch(runs, reference, None), len(directions)
         each, way = np.repeat(np.arange(len(runs)), count), np.tile(np.arange(count), len(runs))
@@ -315,11 +323,9 @@ class ClosedLoop:
         return self._made["law"]
 
 
-def _extras(runs: Sequence[Run]) -> frozenset[str]:
-    wanted = {
-        "quantisation": any(run.scenario.quantisation > 0 for run in runs),
-        "fault": any(run.scenario.fault is not None for run in runs),
-    }
+def _extras(run: Run) -> frozenset[str]:
+    """What a run needs of the loop besides."""
+    wanted = {"quantisation": run.scenario.quantisation > 0, "fault": run.scenario.fault is not None}
     return frozenset(name for name, needed in wanted.items() if needed)
 
 

@@ -128,9 +128,8 @@ def metrics(found: dict[str, float], lost: float, yardstick: Yardstick, period: 
     """
     gone = math.isfinite(lost)
     ticks = min(count, max(1, round(lost / period))) if gone else count
-    end = (ticks - 1) * period
     late = int(np.count_nonzero(period * np.arange(ticks) >= yardstick.transient)) or 1
-    settled = min(found["outside"] + period, end) if found["ever outside"] else 0.0
+    settled = ticks * period if gone else found["outside"] + period if found["ever outside"] else 0.0
     return Metrics(
         maximum_error_m=math.inf if gone else found["late"],
         rms_error_m=math.inf if gone else math.sqrt(found["squares"] / late),

@@ -57,14 +57,15 @@ class System:
         tau: Symbol of the time since the tick, s.
         tasks: In the order in which they run.
         rate: x' as an expression of x, z, shared, own, fixed and t. Shape (n,).
-        alive: Nonzero while the run is sound; a comparison that fails for NaN.
+        alive: Nonzero while the run is sound; zero or NaN at a tick or at its end loses the run.
         records: The figures.
         signals: What a trace keeps at each tick after the tasks, by name, each a column.
         period: Duration of a tick, s.
         substeps: Runge-Kutta steps in a tick.
 
     Raises:
-        ValueError: a task's period or the number of steps is not positive.
+        ValueError: a task's period or the number of steps is not positive, a shape is wrong, or an expression depends
+            on what it may not.
     """
 
     x: Any
@@ -87,6 +88,27 @@ class System:
         counts = [self.substeps, *(task.every for task in self.tasks)]
         if not (self.period > 0 and all(isinstance(c, int) and c > 0 for c in counts)):
             raise ValueError(f"periods and steps are positive whole numbers of ticks: got {self.period}, {counts}")
+        sizes, everything = self.sizes, "xzslvftd"
+        for task in self.tasks:
+            self._check("a task", task.after, sizes["z"], everything.replace("d", ""))
+        self._check("the rate", self.rate, sizes["x"], "xzslft")
+        self._check("alive", self.alive, 1, everything)
+        for record in self.records:
+            self._check(f'record "{record.name}"', record.value, 1, everything)
+        for name, value in self.signals.items():
+            self._check(f'signal "{name}"', value, None, everything)
+
+    def _check(self, what: str, value: Any, rows: int | None, letters: str) -> None:
+        """A column of so many rows, of symbols from some groups."""
+        import casadi as ca
+
+        value = ca.SX(value)
+        if value.shape[1] != 1 or (rows is not None and value.shape[0] != rows):
+            raise ValueError(f"{what} is a column of {'any' if rows is None else rows} rows: got {value.shape}")
+        known = {s.__hash__() for letter in letters for s in ca.symvar(ca.SX(self.groups[letter]))}
+        strangers = [str(s) for s in ca.symvar(value) if s.__hash__() not in known]
+        if strangers:
+            raise ValueError(f"{what} depends on {', '.join(letters)} alone: got {', '.join(strangers)}")
 
     @property
     def groups(self) -> dict[str, Any]:

@@ -81,8 +81,7 @@ def _tick(system: System) -> Any:
         z = ca.vertcat(*(ca.if_else(due, after[i], z[i]) for i in range(z.numel()))) if task.every > 1 else after
     signals = ca.vertcat(*(_at(system, value, x, z) for value in system.signals.values()))
     time = tick * system.period
-    failed = _at(system, system.alive, x, z) == 0
-    now = ca.if_else(failed, ca.if_else(lost < time, lost, time), lost)
+    now = _judged(system, lost, time, x, z, 0.0)
     alive = now == ca.inf
     sums = _recorded(system, figures, alive, x, z, 0.0, between=False)
     h = system.period / system.substeps
@@ -95,11 +94,21 @@ def _tick(system: System) -> Any:
         k4 = rate(x + h * k3, *held)
         x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         sums = _recorded(system, sums, alive, x, z, (step + 1) * h, between=True)
+    now = _judged(system, now, time + system.period, x, z, system.period)
     before = ca.vertcat(system.x, system.z, lost, figures)
     columns = ca.vertcat(tick, system.shared, system.own, system.draws)
     outputs = [ca.vertcat(x, z, now, sums), signals]
     outputs = [ca.substitute([part], [system.t], [time])[0] for part in outputs]
     return ca.Function("tick", [before, columns, system.fixed], outputs, {"cse": True})
+
+
+def _judged(system: System, lost: Any, time: Any, x: Any, z: Any, tau: float) -> Any:
+    """The first time at which a run is not sound."""
+    import casadi as ca
+
+    sound = _at(system, system.alive, x, z, tau)
+    failed = ca.logic_or(sound == 0, sound != sound)
+    return ca.if_else(failed, ca.if_else(lost < time, lost, time), lost)
 
 
 def _held(system: System) -> list[Any]:

@@ -1,5 +1,7 @@
 """The engine: compiled code against CasADi's virtual machine, NumPy, SciPy and closed forms."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from scipy.integrate import solve_ivp
 from hdmm_opt.simulation import Batch, Engine, Record, System, Task, kernel
 from hdmm_opt.simulation.sensitivity import differentiated
 from hdmm_opt.simulation.virtual import uniform
+from stability.expression import straight_line
 
 TICK = 1e-3
 
@@ -70,12 +73,16 @@ def test_transcendental_functions_are_exact_to_2e_15(name):
     assert float(np.abs((found - exact) / scale).max()) < 2e-15
 
 
-def test_exp_saturates_and_tanh_ends():
-    x = np.array([1e6, -1e6, 800.0, -800.0, np.nan, 25.0, -25.0])
-    loop = system(tasks=[(1, lambda a: ca.vertcat(ca.exp(a["l"]), ca.tanh(a["l"])))], sizes=(1, 2, 1, 1, 0, 1))
+def test_the_ends_of_exp_tanh_sin_and_cos():
+    x = np.array([1e6, -1e6, 709.5, -709.5, np.nan, 25.0, -25.0, np.inf, -np.inf, 1e11, 1e18])
+    tasks = [(1, lambda a: ca.vertcat(ca.exp(a["l"]), ca.tanh(a["l"]), ca.sin(a["l"]), ca.cos(a["l"])))]
+    loop = system(tasks=tasks, sizes=(1, 4, 1, 1, 0, 1))
     found = Engine(loop, compiled=True).run(batch(loop, 1, x.size, own=x[None, None, :]), trace=True).trace[:, :, 0]
-    assert found[:4, 0] == pytest.approx(np.exp([708.0, -708.0] * 2), rel=1e-13) and np.isnan(found[4]).all()
-    assert (found[:4, 1] == [1, -1, 1, -1]).all() and (found[5:, 1] == [1, -1]).all()
+    assert (found[[0, 1, 3, 7, 8], 0] == [np.inf, 0, 0, np.inf, 0]).all()
+    assert found[2, 0] == pytest.approx(np.exp(709.5), rel=1e-15) and np.isnan(found[4]).all()
+    assert (found[[0, 1, 5, 6, 7, 8], 1] == [1, -1, 1, -1, 1, -1]).all()
+    assert found[9, 2:] == pytest.approx([np.sin(1e11), np.cos(1e11)], abs=2e-15)
+    assert np.isnan(found[[7, 8, 10], 2:]).all()  # no angle: better nothing than something
 
 
 def test_draws_are_splitmix64():
@@ -241,6 +248,90 @@ def test_the_differentiated_loop_gives_the_derivative_of_the_loop():
         assert slopes[k] == pytest.approx((total(at + step) - total(at - step)) / 2e-5, rel=1e-6)
 
 
+def test_what_cancels_stays_zero_and_divisions_are_rounded_as_such():
+    """a² - b² under a root, and quotients that a floor looks at: fused or multiplied they would be off by an ulp."""
+    random = np.random.default_rng(3)
+    a, b = random.normal(size=(2, 20_000))
+
+    def task(s):
+        x, y, c = s["l"][0], s["l"][1], s["f"][0]
+        return ca.vertcat(ca.sqrt(x**2 - (x + 0 * y) ** 2), x / 49, x / c, ca.floor(100 * x / c), x * y - y * x)
+
+    loop = system(tasks=[(1, task)], sizes=(1, 5, 1, 2, 0, 1))
+    fixed = np.array([[0.1, 0.0025, 49.0]])
+    given = batch(loop, 3, a.size, own=np.repeat(np.array([[a, b]]), 3, axis=0), fixed=fixed)
+    one, other = (Engine(loop, compiled=c).run(given, trace=True).trace for c in (True, False))
+    assert (one[:, [0, 4]] == 0).all() and (one == other).all()
+    for k, c in enumerate(fixed[0]):
+        assert (one[:, 2, k] == a / c).all()
+
+
+def test_minimum_maximum_and_sign_are_those_of_casadi_for_nan_and_zero():
+    special = np.array([0.0, -0.0, 1.0, -2.0, np.inf, -np.inf, np.nan])
+    pairs = np.array([[p, q] for p in special for q in special]).T
+
+    def task(s):
+        p, q = s["l"][0], s["l"][1]
+        return ca.vertcat(ca.fmin(p, q), ca.fmax(p, q), ca.sign(p), p < q, p <= q, p == q, p != q,
+                          ca.logic_and(p, q), ca.logic_or(p, q), ca.logic_not(p), ca.if_else(p, q, 3))  # fmt: skip
+
+    loop = system(tasks=[(1, task)], sizes=(1, 11, 1, 2, 0, 1))
+    given = batch(loop, 1, pairs.shape[1], own=pairs[None])
+    one, other = (Engine(loop, compiled=c).run(given, trace=True).trace for c in (True, False))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_sparse_outputs_keep_their_places():
+    x = ca.SX.sym("x", 3)
+    y = ca.SX(4, 1)
+    y[2], y[3] = x[0] + 1, x[2] ** 2
+    program = straight_line(ca.Function("f", [x], [y]), ("a", "b", "c"))
+    assert program({"a": 1.0, "b": 2.0, "c": 3.0}) == [0.0, 0.0, 2.0, 9.0]
+    with pytest.raises(ValueError, match="dense input"):
+        straight_line(ca.Function("f", [ca.SX.sym("s", ca.Sparsity.diag(2))], [ca.SX(1)]), ("a", "b", "c", "d"))
+    loop = system(rate=lambda a: ca.mtimes(ca.sparsify(ca.DM([[0, 0], [1, 0]])), a["x"]), sizes=(2, 1, 1, 1, 0, 1),
+                  signals={"x": lambda a: a["x"]}, period=1.0)  # fmt: skip
+    given = batch(loop, 1, 3, x=np.array([[1.0], [0.0]]))
+    for compiled in (True, False):
+        assert Engine(loop, compiled=compiled).run(given, trace=True).trace[:, :, 0].tolist() == [
+            [1, 0],
+            [1, 1],
+            [1, 2],
+        ]
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_loss_in_the_last_tick_is_seen(compiled):
+    loop = system(
+        rate=lambda a: a["l"], alive=lambda a: ca.fabs(a["x"]) < 10, records=(("peak", "max", lambda a: a["x"], True),)
+    )
+    for bad in (np.nan, np.inf, 1e9):
+        own = np.zeros((2, 1, 5))
+        own[1, 0, -1] = bad
+        found = Engine(loop, compiled=compiled).run(batch(loop, 2, 5, own=own, x=np.zeros((1, 2))))
+        assert found.lost[0] == np.inf and found.lost[1] == pytest.approx(5 * TICK)
+
+
+def test_arrays_of_any_kind_are_taken_and_wrong_shapes_refused():
+    loop = system(tasks=[(1, lambda a: a["s"][:1] + a["f"][0])], sizes=(1, 1, 2, 1, 0, 2))
+    good = batch(loop, 3, 4)
+    engine = Engine(loop, compiled=True)
+    for kind in (np.int64, np.float32):
+        whole = replace(good, shared=np.arange(8).reshape(4, 2).astype(kind), fixed=np.ones((2, 3), dtype=kind))
+        assert engine.run(whole, trace=True).trace[:, 0, 1].tolist() == [1, 3, 5, 7]
+    turned = replace(good, shared=np.asfortranarray(good.shared))
+    assert (engine.run(turned, trace=True).trace == engine.run(good, trace=True).trace).all()
+    for wrong in (
+        {"shared": good.shared[:, :1]}, {"fixed": good.fixed[:1]}, {"x": np.zeros((2, 3))}, {"z": np.zeros((1, 2))},
+        {"own": lambda run, first, size: np.zeros((2, size))},
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match="shape"):
+            engine.run(replace(good, **wrong))
+    with pytest.raises(ValueError, match="at least one lane"):
+        engine.run(good, lanes=0)
+    assert engine.run(batch(loop, 0, 4)).figures.shape == (0, 0)
+
+
 @given(st.integers(0, 10_000))
 def test_random_loops_agree(seed):
     """Random straight-line programs over every operation of the compiler, at one tick."""
@@ -278,8 +369,17 @@ def test_kernels_are_kept_on_disk_and_a_damaged_one_is_not_loaded(tmp_path, monk
     assert (Engine(loop, compiled=True).run(given).figures == first).all() and not compiled
     kept.write_bytes(kept.read_bytes()[:-7])
     assert (Engine(loop, compiled=True).run(given).figures == first).all() and compiled
+    assert [p.suffix for p in tmp_path.iterdir()] == [".o"]
     monkeypatch.setenv(kernel.CACHE_VARIABLE, str(tmp_path / "file" / "below"))
     (tmp_path / "file").write_text("in the way")
+    assert (Engine(loop, compiled=True).run(given).figures == first).all()
+    monkeypatch.delenv(kernel.CACHE_VARIABLE)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(kernel.Path, "home", homeless)
     assert (Engine(loop, compiled=True).run(given).figures == first).all()
 
 
@@ -300,3 +400,20 @@ def test_an_unknown_operation_is_refused():
 def test_periods_and_steps_must_be_positive(wrong):
     with pytest.raises(ValueError, match="positive whole numbers"):
         system(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"rate": lambda a: ca.vertcat(a["x"], a["x"])}, "the rate is a column of 1 rows"),
+        ({"rate": lambda a: a["x"] * a["v"]}, "the rate depends on"),
+        ({"rate": lambda a: a["x"] * a["d"]}, "the rate depends on"),
+        ({"tasks": [(1, lambda a: ca.horzcat(a["z"], a["z"]))]}, "a task is a column"),
+        ({"tasks": [(2, lambda a: ca.vertcat(a["z"], a["z"]))]}, "a task is a column"),
+        ({"records": [("r", "max", lambda a: ca.vertcat(a["x"], a["x"]), True)]}, 'record "r" is a column of 1'),
+        ({"alive": lambda a: ca.SX.sym("stranger")}, "got stranger"),
+    ],
+)
+def test_a_loop_with_wrong_shapes_or_strangers_is_refused(wrong, said):
+    with pytest.raises(ValueError, match=said):
+        system(**{"sizes": (1, 1, 1, 1, 1, 1), **wrong})

@@ -116,9 +116,7 @@ def test_a_fault_is_shown_and_counts_for_nothing_else():
     assert shown[0].largest_error == shown[1].largest_error and shown[0].missed == shown[1].missed == ()
 
 
-def test_a_coarse_integration_is_reported(problem):
-    coarse = replace(problem.loop)
-    coarse.substeps = lambda: 3 * coarse.refinement  # type: ignore[method-assign]
+def test_the_integration_error_is_estimated(problem):
     scenario = scenarios(problem.study)[0]
     fine = problem.loop.integration_error(GAINS, problem.reference, scenario)
     reference = replace(problem.loop, refinement=16).run(GAINS, problem.reference, scenario)
