@@ -139,7 +139,7 @@ class _Compiler:
         start = [self.read(box) for box in x]
 
         def rate(at: list[str]) -> list[str]:
-            return self.values(system.rate, known | {f"x{i}": value for i, value in enumerate(at)})
+            return self.values(system.rate, known | {f"x{i}": value for i, value in enumerate(at)}, quick=True)
 
         def moved(slope: list[str], by: float) -> list[str]:
             return [out.fma(out.const(by), s, a) for s, a in zip(slope, start, strict=True)]
@@ -178,9 +178,9 @@ class _Compiler:
                 after = out.add(before, value)
             self.keep(box, out.select(alive, after, before))
 
-    def values(self, column: Any, known: Mapping[str, str]) -> list[str]:
+    def values(self, column: Any, known: Mapping[str, str], *, quick: bool = False) -> list[str]:
         """The elements of a column of symbols, written out in line."""
-        return _inline(self.out, self._expression(column), known)
+        return _inline(self.out, self._expression(column), known, quick=quick)
 
     def _expression(self, column: Any) -> Expression:
         import casadi as ca
@@ -231,12 +231,12 @@ class _Compiler:
         return out.uniform(seeds, out.spread(out.emit(f"add i64 {first}, {channel + 1}"), "i64"))
 
 
-def _inline(out: Assembler, program: Expression, known: Mapping[str, str]) -> list[str]:
+def _inline(out: Assembler, program: Expression, known: Mapping[str, str], *, quick: bool) -> list[str]:
     """Write a straight-line program.
 
     A product that is used once is fused into a sum, unless the other term is a product too: a² - b² stays zero where
-    a = b. A division by what is constant in a run becomes a product with the reciprocal, which leaves the loops, and a
-    correction, so that it is rounded like the division.
+    a = b. Where `quick`, a division by what is constant in a run becomes a product with the reciprocal, which leaves
+    the loops; that costs an ulp, which a rate that is integrated does not show.
     """
     operations = program.operations
     uses = [0] * len(operations)
@@ -275,8 +275,8 @@ def _inline(out: Assembler, program: Expression, known: Mapping[str, str]) -> li
         whole = fused(operator, arguments[0], arguments[1]) if len(arguments) == 2 else None
         if whole is not None:
             names.append(whole)
-        elif operator == "div" and levels[arguments[1]] == _LEVEL["f"] < levels[arguments[0]]:
-            names.append(out.quotient(*given))
+        elif quick and operator == "div" and levels[arguments[1]] == _LEVEL["f"] < levels[arguments[0]]:
+            names.append(out.mul(given[0], out.div(out.const(1.0), given[1])))
         else:
             names.append(_operation(out, operator, given))
     return [names[index] for index in program.outputs]

@@ -158,17 +158,6 @@ class Assembler:
             x = self.mul(x, x)
         return terms[0]
 
-    def quotient(self, a: str, b: str) -> str:
-        """A / b from the reciprocal of b, for a divisor that is the same for many dividends.
-
-        Rounded like a division wherever 1 / b is a normal number (Markstein 1990).
-        """
-        inverse = self.div(self.const(1.0), b)
-        first = self.mul(a, inverse)
-        better = self.fma(self.fma(self.neg(first), b, a), inverse, first)
-        finite = self.compare("olt", self.intrinsic("fabs", first), self.const(float("inf")))
-        return self.select(finite, better, first)
-
     def sign(self, x: str) -> str:
         """-1, 1, or x itself where it is zero or NaN."""
         negative = self.select(self.compare("olt", x, self.const(0.0)), self.const(-1.0), x)
