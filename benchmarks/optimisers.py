@@ -30,7 +30,7 @@ def costs(problem: Problem, evaluate, first: np.ndarray, method: str, evaluation
         return math.inf if found is None else found.outcome.cost
     random = np.random.default_rng(seed)
     starts = [first, *random.uniform(size=(50, first.size))]
-    tried, _ = descent(problem, starts, evaluations - 1)
+    tried, _ = descent(problem, starts, Budget(evaluations=evaluations - 1))
     return evaluate([tried[0]])[0].cost if tried else math.inf
 
 

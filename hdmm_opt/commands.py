@@ -129,7 +129,7 @@ def run_simulate(path: Path, name: str | None, csv_path: Path | None, as_json: b
         if csv_path is not None:
             write_text(csv_path, _csv(problem, loop.run(gains, problem.reference, scenario)))
     if as_json:
-        click.echo(json.dumps({key: asdict(metrics) for key, metrics in results.items()}, indent=1))
+        click.echo(json.dumps({key: validation.finite(metrics) for key, metrics in results.items()}, indent=1))
     else:
         for key, metrics in results.items():
             click.echo(key)

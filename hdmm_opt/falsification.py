@@ -23,6 +23,7 @@ from .errors import InvalidInputError
 from .problem import Problem
 from .simulation import Metrics, Run, Scenario
 from .state import State
+from .validation import finite
 
 Array = NDArray[np.float64]
 
@@ -243,7 +244,7 @@ def stored(document: dict[str, Any], witness: Witness) -> dict[str, Any]:
     shown["largest_error_m"] = max(shown["largest_error_m"], witness.largest_error)
     if late >= shown["largest_error_after_transient_m"]:
         scenario = {**asdict(witness.scenario), "load": [list(p) for p in witness.scenario.load]}
-        shown["worst_case"] = {"scenario": scenario, "metrics": asdict(witness.metrics)}
+        shown["worst_case"] = {"scenario": scenario, "metrics": finite(witness.metrics)}
         shown["largest_error_after_transient_m"] = late
         shown["bound_over_simulated"] = ball / late if late > 0 else None
     return {**document, "validation": shown}

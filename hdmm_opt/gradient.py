@@ -7,14 +7,14 @@ which come out of a search for a certificate, are differenced.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stability import Certificate, Failure, Gains
-from tuning import Derivatives, descend
+from tuning import Budget, Derivatives, descend
 
 from .evaluation import certified_cost, cost_scales, cost_scenarios, find, simulated_cost
 from .problem import KINDS, Problem
@@ -29,19 +29,23 @@ STEP = 1e-3
 EXACT = 15
 
 
-def descent(problem: Problem, starts: Sequence[Array], evaluations: int) -> tuple[list[Array], int]:
+def descent(
+    problem: Problem, starts: Sequence[Array], budget: Budget,
+    progress: Callable[[int, float], None] = lambda used, cost: None,
+) -> tuple[list[Array], int]:  # fmt: skip
     """Minimise the cost of `evaluation.py` from some points of the unit cube.
 
     Args:
         problem: The study's problem.
         starts: Points to begin from, one after the other. Each shape (d,).
-        evaluations: Budget. A point costs one, its derivatives one more for each gain that is searched: as many
+        budget: A point costs one evaluation, its derivatives one more for each gain that is searched: as many
             certificates, and as many runs of the differentiated loop as the gains have directions.
+        progress: Called with the evaluations used and the best cost.
 
     Returns:
         The proved points that were tried, the best first, and the evaluations used.
     """
-    return descend(lambda point, want: derivatives(problem, point, want), starts, _count(problem), evaluations)
+    return descend(lambda point, want: derivatives(problem, point, want), starts, _count(problem), budget, progress)
 
 
 def derivatives(problem: Problem, point: Array, wanted: bool) -> Derivatives:

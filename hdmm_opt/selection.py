@@ -17,7 +17,6 @@ from tuning import Best, Budget, Outcome, Population, Selection, best_of, select
 from tuning import search as run_search
 from tuning.decimals import rounded, shortest
 
-from .errors import InvalidInputError
 from .evaluation import evaluate, make_evaluator
 from .problem import KINDS, Problem
 from .proof import certificate, violation
@@ -149,7 +148,7 @@ def search(
 
     method, start = problem.study.tuning.method, problem.point(first.gains)
     if method == "gradient":
-        return _descended(problem, start, seed, allowed.evaluations, composed)
+        return _descended(problem, start, seed, allowed, composed, progress)
     with workers(_make, (problem.study, composed), options.jobs, options.cluster) as pool:
         found = run_search(
             method, pool.map, start, population, seed, allowed, restored=kept_population(state), after=after
@@ -161,12 +160,16 @@ def search(
     return _shortened(problem, best, found.evaluations, found.runs, composed)
 
 
-def _descended(problem: Problem, start: Array, seed: int, evaluations: int, composed: bool) -> Found:
-    """Descent from the start and then from random points, until the budget is used."""
+def _descended(problem: Problem, start: Array, seed: int, allowed: Budget, composed: bool, progress: Progress) -> Found:
+    """Descent from the start and then from random points, until the budget is used; it is not resumed but repeated."""
     from .gradient import descent
 
-    others = np.random.default_rng(seed).uniform(size=(evaluations, start.size))
-    tried, used = descent(problem, [start, *others], evaluations - 1)
+    others = np.random.default_rng(seed).uniform(size=(allowed.evaluations, start.size))
+    budget = replace(allowed, evaluations=allowed.evaluations - 1)
+    tried, used = descent(
+        problem, [start, *others], budget,
+        lambda spent, cost: progress.update(spent / allowed.evaluations, f"best {cost:.4g}"),
+    )  # fmt: skip
     point = tried[0] if tried else start
     (outcome,) = evaluate(problem, [problem.gains(point)], composed=composed)
     if not outcome.feasible:
@@ -212,25 +215,18 @@ def to_data(state: Population) -> dict[str, Any]:
 
 
 def kept_population(state: State) -> Population | None:
-    """The population that a state holds.
-
-    Raises:
-        InvalidInputError: it holds something else.
-    """
+    """The population that a state holds, or None."""
     data = state.get("search")
     if data is None:
         return None
-    try:
-        return Population(
-            iteration=int(data["iteration"]),
-            points=np.array(data["points"], dtype=float),
-            outcomes=tuple(
-                Outcome(violation=v, cost=math.inf if c is None else c, objectives=tuple(o), runs=r)
-                for v, c, o, r in data["outcomes"]
-            ),
-            random=data["random"],
-            evaluations=int(data["evaluations"]),
-            runs=int(data["runs"]),
-        )
-    except (ValueError, KeyError, TypeError):
-        raise InvalidInputError(f"{state.path}: not a state of this release; delete it or leave out --resume") from None
+    return Population(
+        iteration=data["iteration"],
+        points=np.array(data["points"]),
+        outcomes=tuple(
+            Outcome(violation=v, cost=math.inf if c is None else c, objectives=tuple(o), runs=r)
+            for v, c, o, r in data["outcomes"]
+        ),
+        random=data["random"],
+        evaluations=data["evaluations"],
+        runs=data["runs"],
+    )

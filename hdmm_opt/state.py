@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import time
 from importlib import metadata
@@ -42,9 +43,11 @@ class State:
         advice = "delete it or leave out --resume"
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
-            key, parts = data["key"], dict(data["parts"])
-        except (OSError, ValueError, KeyError, TypeError):
-            raise InvalidInputError(f"{path}: not a state of this release; {advice}") from None
+            key, parts, seal = data["key"], dict(data["parts"]), data["seal"]
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+            raise InvalidInputError(f"{path}: damaged, or not a state of this release; {advice}") from None
+        if seal != _seal(parts):
+            raise InvalidInputError(f"{path}: its content was changed; {advice}")
         if key != self._key or data.get("schema") != SCHEMA:
             raise InvalidInputError(f"{path}: belongs to another study, seed, budget or release; {advice}")
         return parts
@@ -58,10 +61,15 @@ class State:
         self._parts[part] = data
         if self.path is None or (often and time.monotonic() - self._written < PAUSE):
             return
-        write_text(self.path, json.dumps({"schema": SCHEMA, "key": self._key, "parts": self._parts}))
+        data = {"schema": SCHEMA, "key": self._key, "seal": _seal(self._parts), "parts": self._parts}
+        write_text(self.path, json.dumps(data))
         self._written = time.monotonic()
 
     def remove(self) -> None:
         """The job is done."""
         if self.path is not None:
             self.path.unlink(missing_ok=True)
+
+
+def _seal(parts: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()

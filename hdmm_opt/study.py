@@ -21,6 +21,8 @@ NonNegative = Annotated[float, Field(ge=0)]
 Pair = tuple[float, float]
 
 
+#: Names of runs that are not the study's.
+RESERVED = ("worst-case", "witness")
 #: No quantity of these machines is larger in SI units.
 LARGEST = 1e12
 
@@ -178,6 +180,12 @@ class WeightSection(_Section):
     itae: NonNegative = 0.2
     effort: NonNegative = 0.2
 
+    @model_validator(mode="after")
+    def _some(self) -> WeightSection:
+        if not self.rms_error + self.certified_bound + self.itae + self.effort > 0:
+            raise ValueError("||needs one weight above zero: got none|give rms_error or certified_bound a weight")
+        return self
+
 
 class TuningSection(_Section):
     """Search budget of the second stage."""
@@ -237,6 +245,11 @@ class Study(_Section):
     @model_validator(mode="after")
     def _consistent(self) -> Study:
         low, high = self.uncertainty.load_force_n
+        names = [scenario.name for scenario in self.validation.scenarios]
+        for name in names:
+            if names.count(name) > 1 or name in RESERVED:
+                reason = "twice" if names.count(name) > 1 else f"{name}, which hdmm-opt uses itself"
+                raise ValueError(f"|validation.scenarios|needs names of its own: got {reason}|rename that scenario")
         for scenario in self.validation.scenarios:
             outside = [f for _, f in scenario.load_n if not low <= f <= high]
             if outside:
@@ -245,6 +258,10 @@ class Study(_Section):
                     f"[{low:g}, {high:g}]: got {outside[0]:g}|widen the assumption or change the scenario"
                 )
             times = [t for t, _ in scenario.load_n]
+            if times[0] < 0:
+                raise ValueError(
+                    f"|validation.scenarios.{scenario.name}|needs times from 0 on in load_n: got {times[0]:g}|correct"
+                )
             if any(b <= a for a, b in pairwise(times)):
                 raise ValueError(f"|validation.scenarios.{scenario.name}|needs increasing times in load_n|sort them")
             for name in scenario.parameters:

@@ -23,6 +23,8 @@ from .workers import workers
 SCHEMA = "hdmm-opt/sweep/1"
 #: Designs of one sweep.
 LARGEST = 10_000
+#: No number of a study is larger.
+LARGEST_VALUE = 1e12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,13 +50,20 @@ def axis(text: str) -> Axis:
     try:
         if ":" in given:
             low, high, count = given.split(":")
-            values = [float(f"{v:.12g}") for v in np.linspace(float(low), float(high), int(count))]
+            ends = (float(low), float(high))
+            if not all(abs(end) <= LARGEST_VALUE for end in ends) or int(count) > LARGEST:
+                raise InvalidInputError(
+                    f"--vary takes at most {LARGEST} values within ±{LARGEST_VALUE:g}: got {text}; vary less"
+                )
+            values = [float(f"{v:.12g}") for v in np.linspace(*ends, int(count))]
         else:
             values = [float(part) for part in given.split(",")]
     except ValueError:
         values = []
-    if not key or not values or not all(map(math.isfinite, values)):
-        raise InvalidInputError(f"--vary needs key=a:b:n or key=a,b,c with finite numbers: got {text}; correct it")
+    if not key or not values or not all(map(math.isfinite, values)) or len(set(values)) < len(values):
+        raise InvalidInputError(
+            f'--vary needs key=a:b:n (n whole) or key=a,b,c with finite numbers that differ: got "{text}"; correct it'
+        )
     return Axis(key=key, values=tuple(values))
 
 
@@ -64,6 +73,10 @@ def grid(study: Study, axes: Sequence[Axis]) -> list[tuple[dict[str, float], Stu
     Raises:
         InvalidInputError: a key that the study does not have, a study that is not valid, or too many of them.
     """
+    keys = [a.key for a in axes]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise InvalidInputError(f"--vary names a key once: got {key} twice; put its values in one list")
     count = math.prod(len(a.values) for a in axes)
     if count > LARGEST:
         raise InvalidInputError(f"a sweep makes at most {LARGEST} designs: got {count}; vary less")
@@ -85,15 +98,19 @@ def varied(study: Study, values: dict[str, float]) -> Study:
         parts = key.split(".")
         if parts[:2] == ["plant", "parameters"] and len(parts) == 4 and parts[2] not in data["plant"]["parameters"]:
             known = defaults(study.plant.level)
-            if parts[2] in known:
-                p = known[parts[2]]
-                entry = {"value": p.value, "unit": p.unit, "tolerance": p.tolerance, "source": p.source}
-                data["plant"]["parameters"][parts[2]] = entry
+            if parts[2] not in known:
+                raise InvalidInputError(f'the plant has no parameter "{parts[2]}"; {nearest(parts[2], known)}')
+            p = known[parts[2]]
+            entry = {"value": p.value, "unit": p.unit, "tolerance": p.tolerance, "source": p.source}
+            data["plant"]["parameters"][parts[2]] = entry
         place: Any = data
         for k, part in enumerate(parts):
             names = [str(i) for i in range(len(place))] if isinstance(place, list) else list(place)
             if part not in names:
-                raise InvalidInputError(f'the study has no "{".".join(parts[: k + 1])}"; {nearest(part, names)}')
+                advice = nearest(part, names) if names else "it is empty"
+                raise InvalidInputError(
+                    f'the study gives no "{".".join(parts[: k + 1])}"; {advice}, or give it a value in the file first'
+                )
             step: Any = int(part) if isinstance(place, list) else part
             if k == len(parts) - 1:
                 if isinstance(place[step], str | bool | dict | list):

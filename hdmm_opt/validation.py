@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -196,12 +197,21 @@ def required(study: Study) -> dict[str, float]:
     return {name: v for name, v in given.items() if name != "peak_voltage_v" or study.plant.level == "voltage"}
 
 
+def finite(metrics: Metrics) -> dict[str, float | bool | None]:
+    """Figures as JSON data; what is not finite, in a run that was lost, is null."""
+    return {name: value if isinstance(value, bool) else _finite(value) for name, value in asdict(metrics).items()}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
 def to_data(problem: Problem, found: Validation, certificate: Certificate) -> dict[str, Any]:
     """The `validation` section of a gain file."""
 
     def entry(scenario: Scenario, metrics: Metrics) -> dict[str, Any]:
         given = asdict(scenario)
-        return {"scenario": {**given, "load": [list(p) for p in scenario.load]}, "metrics": asdict(metrics)}
+        return {"scenario": {**given, "load": [list(p) for p in scenario.load]}, "metrics": finite(metrics)}
 
     everything = [m for s, m in found.runs if s.covered] + ([found.worst[1]] if found.worst else [])
     bound = float(certificate.ball[0])
@@ -210,7 +220,7 @@ def to_data(problem: Problem, found: Validation, certificate: Certificate) -> di
             {
                 "name": name,
                 "required": limit,
-                "simulated": max((getattr(m, METRIC_OF[name]) for m in everything), default=None),
+                "simulated": _finite(max((getattr(m, METRIC_OF[name]) for m in everything), default=math.inf)),
                 "certified": bound if name == "tracking_error_m" else None,
             }
             for name, limit in required(problem.study).items()
@@ -220,7 +230,7 @@ def to_data(problem: Problem, found: Validation, certificate: Certificate) -> di
         "monte_carlo": found.monte_carlo,
         "simulated_runs": found.count,
         "integration_error_m": found.integration_error,
-        "largest_error_m": found.largest_error,
-        "largest_error_after_transient_m": found.largest_late_error,
+        "largest_error_m": _finite(found.largest_error),
+        "largest_error_after_transient_m": _finite(found.largest_late_error),
         "bound_over_simulated": bound / found.largest_late_error if found.largest_late_error > 0 else None,
     }

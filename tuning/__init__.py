@@ -1,5 +1,6 @@
 """Tuning: convex gain selection, JAYA, TLBO, random search, gradients, Pareto sets, executors."""
 
+from .budget import Budget as Budget
 from .comparison import Outcome as Outcome
 from .executor import Executor as Executor
 from .executor import executor as executor
@@ -11,7 +12,6 @@ from .population import Population as Population
 from .population import start as start
 from .search import METHODS as METHODS
 from .search import Best as Best
-from .search import Budget as Budget
 from .search import best_of as best_of
 from .search import search as search
 from .selection import Selection as Selection

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .budget import Budget
 
 Array = NDArray[np.float64]
 
@@ -36,15 +39,17 @@ class _SpentError(Exception):
 
 
 def descend(
-    differentiate: Callable[[Array, bool], Derivatives], starts: Sequence[Array], slacks: int, evaluations: int
-) -> tuple[list[Array], int]:
+    differentiate: Callable[[Array, bool], Derivatives], starts: Sequence[Array], slacks: int, budget: Budget,
+    progress: Callable[[int, float], None] = lambda used, cost: None,
+) -> tuple[list[Array], int]:  # fmt: skip
     """Minimise the cost from each start in turn until the budget is used.
 
     Args:
         differentiate: Cost and constraints at a point; with derivatives where the second argument is true.
         starts: Points of the unit cube to begin from; the first ones matter most. Each shape (d,).
         slacks: Number of constraints c.
-        evaluations: Budget, by the count of `differentiate`.
+        budget: Evaluations by the count of `differentiate`, and seconds.
+        progress: Called with the evaluations used and the best cost.
 
     Returns:
         All points that were tried and have a certificate and nonnegative slacks, in order of cost, and the
@@ -54,7 +59,7 @@ def descend(
         A. Wächter and L. T. Biegler (2006), Mathematical Programming 106, 25-57.
     """
     tried: list[tuple[float, Array]] = []
-    used = 0
+    used, begun = 0, time.monotonic()
     known: dict[tuple[bytes, bool], Derivatives] = {}
 
     def at(point: Array, derivatives: bool) -> Derivatives:
@@ -63,13 +68,14 @@ def descend(
         for key in ((point.tobytes(), True), (point.tobytes(), derivatives)):
             if key in known:
                 return known[key]
-        if used >= evaluations:
+        if used >= budget.evaluations or time.monotonic() - begun > budget.seconds:
             raise _SpentError
         found = differentiate(point, derivatives)
         used += found.evaluations
         known[point.tobytes(), derivatives] = found
         if np.isfinite(found.cost) and (found.slacks >= 0).all():
             tried.append((found.cost, point))
+            progress(used, min(cost for cost, _ in tried))
         return found
 
     for first in starts:

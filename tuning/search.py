@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .budget import Budget
 from .comparison import Outcome
 from .jaya import jaya
 from .population import Evaluate, Population, start
@@ -23,19 +24,6 @@ METHODS: dict[str, tuple[Callable[[Evaluate, Population], Population], int]] = {
     "tlbo": (tlbo, 2),
     "random": (random_search, 1),
 }
-
-
-@dataclass(frozen=True, kw_only=True)
-class Budget:
-    """When a search ends: at whichever comes first.
-
-    Attributes:
-        evaluations: Candidates that may be evaluated, the first population included; at least one iteration's.
-        seconds: Wall-clock time. A search that it ends is not reproducible.
-    """
-
-    evaluations: int
-    seconds: float = float("inf")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -110,11 +110,10 @@ def _compiled(text: str, machine: Any) -> bytes:
 
 
 def _folder() -> Path | None:
-    chosen = os.environ.get(CACHE_VARIABLE)
-    if chosen is not None:
-        return Path(chosen) if chosen else None
-    home = os.environ.get("XDG_CACHE_HOME")
+    chosen, home = os.environ.get(CACHE_VARIABLE), os.environ.get("XDG_CACHE_HOME")
     try:
+        if chosen is not None:
+            return Path(chosen).expanduser() if chosen else None
         return (Path(home) if home else Path.home() / ".cache") / "hdmm-opt"
     except RuntimeError:  # a user without a home
         return None

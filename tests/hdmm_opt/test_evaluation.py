@@ -1,12 +1,14 @@
 """The closed-loop cost, its derivatives, and what validation makes of runs outside the assumptions."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hdmm_opt import selection, study, validation
-from hdmm_opt.evaluation import evaluate, make_evaluator
+from hdmm_opt.errors import InvalidInputError
+from hdmm_opt.evaluation import evaluate, find, make_evaluator
 from hdmm_opt.gradient import derivatives, descent
 from hdmm_opt.problem import assemble
 from hdmm_opt.selection import Options, Progress
@@ -14,6 +16,7 @@ from hdmm_opt.simulation import Run, scenarios
 from hdmm_opt.state import State
 from hdmm_opt.tradeoff import tradeoff
 from stability import Gains
+from tuning import Budget
 from tuning.pareto import dominates
 
 GAINS = (Gains(beta=24.0), Gains(beta=6000.0))
@@ -72,7 +75,7 @@ def test_the_gradient_of_the_whole_cost(problem):
 
 def test_descent_stays_in_the_proved_set_and_gets_better(problem):
     first = np.array([0.5, 0.3, 0.3, 0.5, 0.5, 0.3, 0.3, 0.6])
-    tried, used = descent(problem, [first], 60)
+    tried, used = descent(problem, [first], Budget(evaluations=60))
     assert used <= 70
     before, after = evaluate(problem, [problem.gains(first), problem.gains(tried[0])])
     assert after.feasible and after.cost < 0.8 * before.cost
@@ -114,6 +117,57 @@ def test_a_fault_is_shown_and_counts_for_nothing_else():
     assert ends[1] == pytest.approx(ends[0] / 0.6, rel=1e-3)
     assert figures.maximum_error_m > shown[1].largest_late_error
     assert shown[0].largest_error == shown[1].largest_error and shown[0].missed == shown[1].missed == ()
+
+
+def test_a_fault_that_loses_the_loop_is_written_as_no_number():
+    faulty = changed(name="lost", load_n=[[0.0, 70e3]], fault={"share": 1.0, "start_s": 3.0, "rate_1_s": 1.0})
+    shown = validation.validate(faulty, GAINS, seed=1, monte_carlo=0, jobs=1, progress=lambda part: None)
+    assert shown.runs[-1][1].diverged and shown.missed == ()
+    data = validation.to_data(faulty, shown, find(faulty, GAINS))
+    json.dumps(data, allow_nan=False)
+    assert data["nominal"][-1]["metrics"]["maximum_error_m"] is None and data["nominal"][-1]["metrics"]["diverged"]
+
+
+def test_faults_do_not_enter_the_cost_and_must_fit_the_inputs():
+    plain = assemble(study.load("emla-p2"))
+    data = plain.study.model_dump(exclude_none=True)
+    lost = {"name": "lost", "load_n": [[0.0, 70e3]], "fault": {"share": 1.0, "start_s": 0.0, "rate_1_s": 9.0}}
+    data["validation"]["scenarios"] = [lost, *data["validation"]["scenarios"]]
+    faulty = assemble(study.validated(data, "test"))
+    ours, theirs = (evaluate(p, [GAINS])[0] for p in (plain, faulty))
+    assert ours.feasible and ours.runs == theirs.runs == 3 and theirs.cost == pytest.approx(ours.cost, rel=0.01)
+    lost["fault"]["stuck"] = [1.0, 2.0]
+    with pytest.raises(InvalidInputError, match="at most one entry for each of torque_command: got 2"):
+        assemble(study.validated(data, "test"))
+    with pytest.raises(ValueError, match="without faults"):
+        run = Run(gains=GAINS, scenario=scenarios(faulty.study)[0])
+        faulty.loop.sensitivities([run], np.eye(8), faulty.reference)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda d: d["validation"]["scenarios"][1].update(name="heavy"), "names of its own: got twice"),
+        (lambda d: d["validation"]["scenarios"][1].update(name="worst-case"), "hdmm-opt uses itself"),
+        (lambda d: d["validation"]["scenarios"][0].update(load_n=[[-1.0, 70e3]]), "times from 0 on"),
+        (
+            lambda d: d["tuning"].update(weights={"rms_error": 0, "certified_bound": 0, "itae": 0, "effort": 0}),
+            "one weight",
+        ),
+        (lambda d: d["tuning"].update(method="genius"), "'jaya', 'tlbo', 'random' or 'gradient'"),
+        (
+            lambda d: d["validation"]["scenarios"][0].update(fault={"share": 2, "start_s": 0, "rate_1_s": 1}),
+            "less than or equal to 1",
+        ),
+        (lambda d: d["validation"]["scenarios"][0].update(quantisation=-0.1), "greater than or equal to 0"),
+    ],
+)
+def test_bad_scenarios_and_tunings_are_one_line(change, said):
+    data = study.load("emla-p2").model_dump(mode="json", exclude_none=True)
+    change(data)
+    with pytest.raises(InvalidInputError, match=said) as caught:
+        study.validated(data, "test")
+    assert "\n" not in str(caught.value)
 
 
 def test_the_integration_error_is_estimated(problem):

@@ -62,7 +62,13 @@ def test_a_parameter_that_the_file_leaves_out_can_be_varied(base):
         ("study.name=1,2", "not a number"),
         ("validation.worst_case=0,1", "not a number"),
         ("controller.rate_hz.deep=1,2", "single value"),
-        ("uncertainty.load_force_n.7=1,2", "has no"),
+        ("uncertainty.load_force_n.7=1,2", "gives no"),
+        ("controller.modelling.0=1,2", "it is empty"),
+        ("tuning.seconds=1,2", "give it a value in the file first"),
+        ("plant.parameters.gear_los.value=1,2", 'did you mean "gear_loss"'),
+        ("controller.rate_hz=1000,1000", "differ"),
+        ("controller.rate_hz=1e999:2:2", "within"),
+        ("controller.rate_hz=500:2000:100000000000", "at most 10000"),
         ("controller.rate_hz=1:2:20000", "at most 10000"),
     ],
 )
@@ -70,6 +76,11 @@ def test_bad_axes_are_refused_in_one_line(base, text, said):
     with pytest.raises(InvalidInputError, match=re.escape(said)) as caught:
         grid(base, [axis(text)])
     assert "\n" not in str(caught.value)
+
+
+def test_a_key_is_varied_once(base):
+    with pytest.raises(InvalidInputError, match="twice"):
+        grid(base, [axis("controller.rate_hz=1000,2000"), axis("controller.rate_hz=500,600")])
 
 
 def run(folder, *arguments):

@@ -102,14 +102,15 @@ def rosenbrock(point, wanted):
 
 def test_descent_ends_at_the_constrained_minimum_and_counts():
     starts = [np.array([0.1, 0.5]), np.array([0.9, 0.9])]
-    tried, used = descend(rosenbrock, starts, 1, 400)
+    tried, used = descend(rosenbrock, starts, 1, Budget(evaluations=400))
     x, y = 1.5 * tried[0]
     angles = np.linspace(0, 2 * np.pi, 100_000)
     edge = [1 + 0.2 * np.cos(angles), 1 + 0.2 * np.sin(angles)]
     best = ((1 - edge[0]) ** 2 + 10 * (edge[1] - edge[0] ** 2) ** 2).min()
     assert (1 - x) ** 2 + 10 * (y - x * x) ** 2 == pytest.approx(best, rel=1e-3) and used <= 400
-    few, spent = descend(rosenbrock, starts, 1, 5)
+    few, spent = descend(rosenbrock, starts, 1, Budget(evaluations=5))
     assert spent <= 7 and len(few) >= 1
+    assert descend(rosenbrock, starts, 1, Budget(evaluations=400, seconds=-1.0)) == ([], 0)
 
 
 def test_descent_survives_points_without_a_certificate():
@@ -120,7 +121,7 @@ def test_descent_survives_points_without_a_certificate():
             jacobian=found.jacobian * math.nan, evaluations=1,
         )  # fmt: skip
 
-    tried, _ = descend(holes, [np.array([0.2, 0.1]), np.array([0.2, 0.6])], 1, 300)
+    tried, _ = descend(holes, [np.array([0.2, 0.1]), np.array([0.2, 0.6])], 1, Budget(evaluations=300))
     assert tried and all(point[1] > 0.3 for point in tried)
 
 
