@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from importlib import metadata
 from typing import Any
 
-from stability import Failure, Gains, checker
+from stability import Certificate, Failure, Gains, checker
 
 from . import gain_file, validation
 from .errors import DefectError
@@ -99,6 +99,28 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
     found = strongest(problem, gains, tried)
     if isinstance(found, Failure) or violation(problem, found, gains) > 0:
         return _refused(problem, gains)
+    document, missed = _validated(problem, gains, found, effort, seed, options, state, progress)
+    progress.stage("exact check")
+    provenance = _provenance(seed, options, spent, begun)
+    finished, report = gain_file.prove({**document, "provenance": provenance})
+    verdicts = tuple(_from_checker(report))
+    accepted = report.status == 0 and not missed
+    notes = (compared(problem, gains, tried, found), _rates(problem, gains)) if accepted else ()
+    return Design(
+        document=finished if accepted else None, report=report, verdicts=verdicts, missed=missed, gains=gains,
+        notes=notes,
+    )  # fmt: skip
+
+
+def _validated(
+    problem: Problem, gains: tuple[Gains, ...], found: Certificate, effort: Effort, seed: int, options: Options,
+    state: State, progress: Progress,
+) -> tuple[dict[str, Any], tuple[str, ...]]:  # fmt: skip
+    """The document of proved gains after the simulations that must agree with it, and the requirements they missed.
+
+    Raises:
+        DefectError: a simulation did what the certificate excludes.
+    """
     progress.stage("validation")
     shown = validation.validate(
         problem, gains, seed=seed, monte_carlo=effort.monte_carlo, jobs=options.jobs,
@@ -109,34 +131,16 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
             f"a simulation reached {shown.largest_error:.6g} m, outside the certified {found.radii[0]:.6g} m; "
             "no file was written, please report this study"
         )
-    data = validation.to_data(problem, shown, found)
-    document = gain_file.build(problem, gains, found, data, {})
-    if effort.falsify:
-        progress.stage("falsification")
-        document = _attacked(problem, gains, document, shown, effort.falsify, seed, options, state, progress)
-    progress.stage("exact check")
-    provenance = _provenance(seed, options, spent, begun)
-    finished, report = gain_file.prove({**document, "provenance": provenance})
-    verdicts = tuple(_from_checker(report))
-    accepted = report.status == 0 and not shown.missed
-    notes = (compared(problem, gains, tried, found), _rates(problem, gains)) if accepted else ()
-    return Design(
-        document=finished if accepted else None, report=report, verdicts=verdicts, missed=shown.missed, gains=gains,
-        notes=notes,
-    )  # fmt: skip
-
-
-def _attacked(
-    problem: Problem, gains: tuple[Gains, ...], document: dict[str, Any], shown: validation.Validation, runs: int,
-    seed: int, options: Options, state: State, progress: Progress,
-) -> dict[str, Any]:  # fmt: skip
-    """The document after a search that tries to break its proof."""
+    document = gain_file.build(problem, gains, found, validation.to_data(problem, shown, found), {})
+    if not effort.falsify:
+        return document, shown.missed
+    progress.stage("falsification")
     known = [s for s, _ in (*shown.runs, *([shown.worst] if shown.worst else []))]
-    witness = falsify(problem, gains, known, runs, seed, progress.update, jobs=options.jobs, state=state)
+    witness = falsify(problem, gains, known, effort.falsify, seed, progress.update, jobs=options.jobs, state=state)
     broken = contradiction(document, witness)
     if broken is not None:
         raise DefectError(f"{broken}; no file was written, please report this study")
-    return stored(document, witness)
+    return stored(document, witness), shown.missed
 
 
 def _rates(problem: Problem, gains: tuple[Gains, ...]) -> str:
