@@ -1,0 +1,111 @@
+"""Geometry of a HIAB-class loader crane: lift, tilt, telescope, and the linear actuators of the first two joints.
+
+Joint coordinates are w1 and w2 in rad, w3 in m; the crane moves in a vertical plane. An actuator between two points at
+distances a and b from a joint closes a triangle,
+
+    x = sqrt(a² + b² + 2 a b cos q) - x0,    q = w + offset,    dx/dq = -a b sin(q) / (x + x0),
+
+whose lever arm vanishes where the three points are in line: there the actuator can hold no torque.
+
+Source of the dimensions: public data of the HIAB XS 031 (source tag "public"); EMLAs stand in the place of its cylinders.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import InvalidInputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActuatorLoop:
+    """A linear actuator across a joint.
+
+    Attributes:
+        name: Name of the joint.
+        a: Distance from the joint to one end of the actuator, m.
+        b: Distance from the joint to the other end, m.
+        dead: Length of the actuator at stroke 0, m.
+        stroke: Longest stroke, m.
+        offset: Angle q minus joint coordinate w, rad.
+    """
+
+    name: str
+    a: float
+    b: float
+    dead: float
+    stroke: float
+    offset: float
+
+    @property
+    def singular_stroke(self) -> float:
+        """The stroke at which the lever arm vanishes because the actuator is stretched out, m."""
+        return self.a + self.b - self.dead
+
+    def extension(self, w: Any) -> Any:
+        """Stroke at a joint coordinate, m; symbols or numbers."""
+        import casadi as ca
+
+        q = w + self.offset
+        return ca.sqrt(self.a**2 + self.b**2 + 2 * self.a * self.b * ca.cos(q)) - self.dead
+
+    def lever(self, w: Any) -> Any:
+        """dx/dw, m/rad: rate of the stroke over that of the joint, and torque over force."""
+        import casadi as ca
+
+        return -self.a * self.b * ca.sin(w + self.offset) / (self.extension(w) + self.dead)
+
+    def coordinate(self, x: Any) -> Any:
+        """Joint coordinate at a stroke, rad, on the branch -π < q < 0 on which the crane works."""
+        import casadi as ca
+
+        length = x + self.dead
+        return -ca.acos((length**2 - self.a**2 - self.b**2) / (2 * self.a * self.b)) - self.offset
+
+    def usable(self, least_lever: float) -> tuple[float, float]:
+        """Joint coordinates inside the stroke at which the lever arm is at least so long.
+
+        Args:
+            least_lever: Shortest admissible |dx/dw|, m/rad.
+
+        Returns:
+            Lowest and highest coordinate, rad.
+
+        Raises:
+            InvalidInputError: the lever is nowhere so long. Its largest value is that of the shorter of a and b.
+        """
+        if not 0 <= least_lever < min(self.a, self.b):
+            raise InvalidInputError(
+                f"{self.name}: a lever arm lies between 0 and {min(self.a, self.b):g} m: got {least_lever:g} m; "
+                "ask for less"
+            )
+        # the lever is the triangle's height over the actuator: it parts the length into the feet of a and b
+        across, along = math.sqrt(self.a**2 - least_lever**2), math.sqrt(self.b**2 - least_lever**2)
+        shortest, longest = max(abs(across - along), self.dead), min(across + along, self.dead + self.stroke)
+        if not shortest < longest:
+            raise InvalidInputError(
+                f"{self.name}: no stroke from 0 to {self.stroke:g} m has a lever arm of {least_lever:g} m; ask for less"
+            )
+        ends = [float(self.coordinate(length - self.dead)) for length in (shortest, longest)]
+        return min(ends), max(ends)
+
+
+LIFT = ActuatorLoop(name="lift", a=1.00712, b=0.37611, dead=0.83, stroke=0.59, offset=-2.073505)
+TILT = ActuatorLoop(name="tilt", a=1.13219, b=0.30901, dead=0.83, stroke=0.59, offset=-0.411577)
+#: Longest extension of the telescope, m.
+TELESCOPE = 1.1
+#: Joint of the lift in the plane; then the next joint, and the tool at telescope 0, each in the frame before it, m.
+BASE, ELBOW, TOOL = (-0.189261, 0.85), (1.59687, 0.100002), (1.99949, 0.154167)
+
+
+def tool(w: Any) -> tuple[Any, Any]:
+    """Horizontal and vertical position of the tool, m, at joint coordinates (w1, w2, w3)."""
+    import casadi as ca
+
+    c1, s1, c12, s12 = ca.cos(w[0]), ca.sin(w[0]), ca.cos(w[0] + w[1]), ca.sin(w[0] + w[1])
+    reach = TOOL[0] + w[2]
+    across = BASE[0] + ELBOW[0] * c1 - ELBOW[1] * s1 + reach * c12 - TOOL[1] * s12
+    up = BASE[1] + ELBOW[0] * s1 + ELBOW[1] * c1 + reach * s12 + TOOL[1] * c12
+    return across, up
