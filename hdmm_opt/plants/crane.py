@@ -7,7 +7,8 @@ distances a and b from a joint closes a triangle,
 
 whose lever arm vanishes where the three points are in line: there the actuator can hold no torque.
 
-Source of the dimensions: public data of the HIAB XS 031 (source tag "public"); EMLAs stand in the place of its cylinders.
+Source of the dimensions: public data of the HIAB XS 031 (source tag "public"); EMLAs stand in the place of its
+cylinders.
 """
 
 from __future__ import annotations
