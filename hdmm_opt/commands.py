@@ -7,7 +7,6 @@ import io
 import json
 import math
 from dataclasses import asdict, replace
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from . import gain_file, pipeline, study, validation
 from .cli import NOT_PROVED, PROVED
 from .errors import DefectError, InvalidInputError
 from .files import check_writable, write_text
-from .gain_file import gains_of, reference_of
+from .gain_file import ball_of, gains_of, reference_of
 from .problem import Problem, assemble, study_of
 from .progress import bar
 from .selection import Options
@@ -95,7 +94,7 @@ def _summary(result: pipeline.Design) -> None:
     for note in result.notes:
         click.echo(note, err=True)
     shown = document["validation"]
-    certified = float(Fraction(document["certificate"]["envelope"]["ball"][0]))
+    certified = ball_of(document)
     late, ratio = shown["largest_error_after_transient_m"], shown["bound_over_simulated"]
     click.echo(
         f"certified error {certified * 1e3:.4g} mm, largest simulated {late * 1e3:.4g} mm in "
@@ -185,7 +184,7 @@ def _csv(problem: Problem, trace: Trace) -> str:
 
 def run_falsify(path: Path, budget: int, seed: int, *, jobs: int = 1, resume: bool = False) -> int:
     """`hdmm-opt falsify`."""
-    from .falsification import ball_of, contradiction, falsify, stored
+    from .falsification import contradiction, falsify, stored
 
     report = checker.check_file(path)
     if report.status != PROVED:
@@ -219,11 +218,10 @@ def run_falsify(path: Path, budget: int, seed: int, *, jobs: int = 1, resume: bo
 
 def run_sweep(name: str, vary: tuple[str, ...], output: Path | None, options: Options) -> int:
     """`hdmm-opt sweep`."""
-    from .sweep import SCHEMA, axis, grid, sweep
+    from .sweep import SCHEMA, axis, sweep
 
     chosen = study.load(name)
     axes = [axis(text) for text in vary]
-    grid(chosen, axes)
     target = Path(f"{chosen.study.name}.sweep.json") if output is None else output
     if target.suffix != ".json":
         raise InvalidInputError(f"the table of a sweep is named .json: got {target}; give -o another name")

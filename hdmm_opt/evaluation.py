@@ -25,7 +25,7 @@ COST_SCENARIOS = 4
 OBJECTIVES = ("rms error", "certified bound", "effort")
 
 
-def make_evaluator(study: Study, *, composed: bool = False) -> Callable[[Sequence[Array]], list[Outcome]]:
+def make_evaluator(study: Study, composed: bool = False) -> Callable[[Sequence[Array]], list[Outcome]]:
     """The outcomes of a batch of points as a pure function.
 
     Args:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from stability import Gains
 
 from .errors import InvalidInputError
+from .gain_file import ball_of
 from .problem import Problem
 from .simulation import Metrics, Run, Scenario
 from .state import State
@@ -229,11 +230,6 @@ def contradiction(document: dict[str, Any], witness: Witness) -> str | None:
         scenario = json.dumps(asdict(witness.scenario))
         return f"a run reached {late:.6g} m, certified {ball:.6g} m, in scenario {scenario}"
     return None
-
-
-def ball_of(document: dict[str, Any]) -> float:
-    """The certified bound on the tracking error after the transient, m."""
-    return float(Fraction(document["certificate"]["envelope"]["ball"][0]))
 
 
 def stored(document: dict[str, Any], witness: Witness) -> dict[str, Any]:

@@ -111,6 +111,11 @@ def gains_of(document: dict[str, Any]) -> tuple[Gains, ...]:
     return tuple(Gains(**{kind: values[f"{kind}_{k + 1}"] for kind in KINDS}) for k in range(count))
 
 
+def ball_of(document: dict[str, Any]) -> float:
+    """The certified bound on the tracking error after the transient, m."""
+    return float(Fraction(document["certificate"]["envelope"]["ball"][0]))
+
+
 def reference_of(document: dict[str, Any]) -> Reference:
     """The reference of a document.
 

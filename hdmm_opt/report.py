@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from .errors import InvalidInputError
 from .files import write_text
-from .gain_file import gains_of, reference_of
+from .gain_file import ball_of, gains_of, reference_of
 from .problem import Problem, assemble, study_of
 from .simulation import Trace, scenarios
 
@@ -88,7 +87,7 @@ def write_report(document: dict[str, Any], folder: Path) -> Path:
     text = page.render(
         name=study["study"]["name"],
         summary=study["study"].get("summary", ""),
-        bound=1e3 * float(Fraction(document["certificate"]["envelope"]["ball"][0])),
+        bound=1e3 * ball_of(document),
         runs=document["validation"].get("simulated_runs", "the"),
         late=1e3 * document["validation"]["largest_error_after_transient_m"],
         rate=f"{document['controller']['rate_hz']:g}",
@@ -130,7 +129,7 @@ def figure(document: dict[str, Any]) -> Any:
         (s.name if s.covered else f"{s.name}, outside the assumptions", problem.loop.run(gains, problem.reference, s))
         for s in scenarios(problem.study)
     ]
-    bound = 1e3 * float(Fraction(document["certificate"]["envelope"]["ball"][0]))
+    bound = 1e3 * ball_of(document)
     titles = ("tracking error [mm]", "position [m]", f"input [{problem.plant.input_unit}]", "load [kN]")
     plot = make_subplots(rows=4, cols=1, shared_xaxes=True, subplot_titles=titles, vertical_spacing=0.06)
     colours = ("#1f5fa8", "#c8553d", "#3a8f5c", "#8a5fb0", "#b08a2e")

@@ -149,7 +149,7 @@ def search(
     method, start = problem.study.tuning.method, problem.point(first.gains)
     if method == "gradient":
         return _descended(problem, start, seed, allowed, composed, progress)
-    with workers(_make, (problem.study, composed), options.jobs, options.cluster) as pool:
+    with workers(make_evaluator, (problem.study, composed), options.jobs, options.cluster) as pool:
         found = run_search(
             method, pool.map, start, population, seed, allowed, restored=kept_population(state), after=after
         )
@@ -186,10 +186,6 @@ def _shortened(problem: Problem, best: Best, evaluations: int, runs: int, compos
         gains = short[0]
         best = Best(point=problem.point(gains), outcome=short[1])
     return Found(gains=gains, best=best, evaluations=evaluations + len(choices), runs=runs)
-
-
-def _make(study: Any, composed: bool) -> Callable[..., list[Outcome]]:
-    return make_evaluator(study, composed=composed)
 
 
 def _with_digits(problem: Problem, gains: tuple[Gains, ...], digits: int) -> tuple[Gains, ...]:

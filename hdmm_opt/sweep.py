@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from . import pipeline
+from . import study as study_file
 from .errors import InvalidInputError
+from .gain_file import ball_of
 from .plants import defaults
 from .problem import KINDS
 from .selection import Options, Progress
@@ -23,8 +24,6 @@ from .workers import workers
 SCHEMA = "hdmm-opt/sweep/1"
 #: Designs of one sweep.
 LARGEST = 10_000
-#: No number of a study is larger.
-LARGEST_VALUE = 1e12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,9 +50,9 @@ def axis(text: str) -> Axis:
         if ":" in given:
             low, high, count = given.split(":")
             ends = (float(low), float(high))
-            if not all(abs(end) <= LARGEST_VALUE for end in ends) or int(count) > LARGEST:
+            if not all(abs(end) <= study_file.LARGEST for end in ends) or int(count) > LARGEST:
                 raise InvalidInputError(
-                    f"--vary takes at most {LARGEST} values within ±{LARGEST_VALUE:g}: got {text}; vary less"
+                    f"--vary takes at most {LARGEST} values within ±{study_file.LARGEST:g}: got {text}; vary less"
                 )
             values = [float(f"{v:.12g}") for v in np.linspace(*ends, int(count))]
         else:
@@ -171,6 +170,6 @@ def _row(found: pipeline.Design) -> dict[str, Any]:
         "gains": {f"{kind}_{k + 1}": getattr(g, kind) for k, g in enumerate(found.gains) for kind in KINDS},
     }
     if found.document:
-        row["certified_error_m"] = float(Fraction(found.document["certificate"]["envelope"]["ball"][0]))
+        row["certified_error_m"] = ball_of(found.document)
         row["simulated_error_m"] = found.document["validation"]["largest_error_after_transient_m"]
     return row

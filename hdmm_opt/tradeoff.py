@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,17 +56,13 @@ def tradeoff(study: Study, options: Options, progress: Progress, size: tuple[int
     first = starting_point(problem)
     progress.stage("Pareto search")
     composed = isinstance(first.certificate, Composition)
-    with workers(_make, (study, composed), options.jobs, options.cluster) as pool:
+    with workers(make_evaluator, (study, composed), options.jobs, options.cluster) as pool:
         now = kept_population(state) or start(pool.map, problem.point(first.gains), population, seed)
         while now.iteration < iterations:
             now = pareto_jaya(pool.map, now)
             state.put("search", to_data(now))
             progress.update(now.iteration / iterations, f"{len(front(now.outcomes))} designs")
     return _set(problem, now), state
-
-
-def _make(study: Study, composed: bool) -> Callable[..., list[Outcome]]:
-    return make_evaluator(study, composed=composed)
 
 
 def _set(problem: Problem, now: Population) -> Tradeoff:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .comparison import Outcome
+from .jaya import move
 from .population import Evaluate, Population
 
 Array = NDArray[np.float64]
@@ -39,8 +40,7 @@ def pareto_jaya(evaluate: Evaluate, state: Population) -> Population:
     random, x = state.generator(), state.points
     order = crowded_order(state.outcomes)
     best, worst = x[order[0]], x[order[-1]]
-    r1, r2 = random.uniform(size=x.shape), random.uniform(size=x.shape)
-    trial = np.clip(x + r1 * (best - np.abs(x)) - r2 * (worst - np.abs(x)), 0.0, 1.0)
+    trial = np.clip(move(random, x, best, worst), 0.0, 1.0)
     rivals = evaluate(list(trial))
     points, outcomes = np.vstack([x, trial]), (*state.outcomes, *rivals)
     kept = crowded_order(outcomes)[: len(x)]

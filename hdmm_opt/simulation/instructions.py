@@ -15,6 +15,8 @@ from collections.abc import Sequence
 _ROUND = 1.5 * 2.0**52
 _LN2 = (math.log(2.0), 2.3190468138462996e-17)
 _HALF_PI = (math.pi / 2, 6.123233995736766e-17)
+#: SplitMix64: the step of its counter, and shifts and factors that mix it.
+STRIDE, MIXES = 0x9E3779B97F4A7C15, ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB))
 #: tanh is 1 in double precision from here on.
 _TANH_END = 20.0
 #: Where exp is no normal number any more, and where it is infinite.
@@ -225,8 +227,8 @@ class Assembler:
 
     def mixed(self, seed: str, counter: str) -> str:
         """64 random bits from a seed and a counter: SplitMix64 (Steele, Lea and Flood 2014)."""
-        z = self.integer("add", seed, self.integer("mul", counter, self.bits(0x9E3779B97F4A7C15)))
-        for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        z = self.integer("add", seed, self.integer("mul", counter, self.bits(STRIDE)))
+        for shift, factor in MIXES:
             z = self.integer(
                 "mul", self.integer("xor", z, self.integer("lshr", z, self.bits(shift))), self.bits(factor)
             )

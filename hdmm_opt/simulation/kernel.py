@@ -10,6 +10,7 @@ import ctypes
 import hashlib
 import os
 import tempfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -34,9 +35,12 @@ def available() -> bool:
     return True
 
 
+@cache
 def vector_lanes() -> int:
     """Numbers of double precision that fit a vector register of this processor."""
-    features = _target()[1]
+    import llvmlite.binding as llvm
+
+    features = llvm.get_host_cpu_features().flatten()
     return 8 if "+avx512f" in features else 4 if "+avx2" in features else 2
 
 
@@ -50,12 +54,12 @@ class Kernel:
     def __init__(self, text: str) -> None:
         import llvmlite.binding as llvm
 
-        machine, features, processor = _target()
+        features, processor = llvm.get_host_cpu_features().flatten(), llvm.get_host_cpu_name()
         seal = "\n".join((text, processor, features, llvm.get_process_triple(), str(llvm.llvm_version_info), _OPTIONS))
         key = hashlib.sha256(seal.encode()).hexdigest()
         code = _cached(key)
         if code is None:
-            code = _compiled(text, machine)
+            code = _compiled(text, _machine())
             _keep(key, code)
         # an engine owns a machine; both must outlive the function
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
@@ -74,13 +78,6 @@ class Kernel:
         if count < 1 or not all(a.flags.c_contiguous and a.dtype == k for a, k in zip(arrays, kinds, strict=True)):
             raise ValueError(f"a kernel takes contiguous arrays of doubles, and at least one tick: got {count}")
         self._run(first, count, *(a.ctypes.data for a in arrays))
-
-
-def _target() -> tuple[Any, str, str]:
-    machine = _machine()
-    import llvmlite.binding as llvm
-
-    return machine, llvm.get_host_cpu_features().flatten(), llvm.get_host_cpu_name()
 
 
 def _machine() -> Any:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .instructions import MIXES, STRIDE
 from .system import System
 
 Array = NDArray[np.float64]
@@ -61,8 +62,8 @@ def uniform(seed: int, ticks: NDArray[np.int64], channels: int) -> Array:
         ticks.astype(np.uint64)[None, :] * np.uint64(channels) + np.arange(1, channels + 1, dtype=np.uint64)[:, None]
     )
     with np.errstate(over="ignore"):
-        z = np.uint64(seed) + counter * np.uint64(0x9E3779B97F4A7C15)
-        for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        z = np.uint64(seed) + counter * np.uint64(STRIDE)
+        for shift, factor in MIXES:
             z = (z ^ (z >> np.uint64(shift))) * np.uint64(factor)
         z = z ^ (z >> np.uint64(31))
     return 2.0 * ((z >> np.uint64(12)) | np.uint64(0x3FF << 52)).view(np.float64) - 3.0
