@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
-import casadi as ca
 import numpy as np
 
-from stability import Interval, enclose, from_casadi
 from trajectories import (
+    Cost,
     LimitViolatedError,
     MotionLimits,
+    Quantities,
     Reference,
     Spline,
     Task,
+    Waypoint,
     constant,
-    effort_peaks,
+    peaks,
     quintic,
     shortest_duration,
     solve,
     violations,
 )
 
+from .enclosure import enclosure
 from .errors import InvalidInputError
 from .plants import EFFORTS, Plant, effort
 from .study import Study
@@ -80,11 +81,15 @@ def _move(study: Study, plant: Plant, k: int, start: float, goal: float, clock: 
         least = shortest_duration(goal - start, limits.speed_m_s, limits.acceleration_m_s2, limits.jerk_m_s3)
         remedy = "move the waypoint" if broken[0].startswith("position") else f"{1.02 * least:.3g} s would do"
         raise LimitViolatedError(f"{broken[0]} in {section.durations_s[k]:g} s; {remedy}")
-    peaks = effort_peaks(spline, task.enclose, task.effort_limits)
-    for name, peak, limit in zip(EFFORTS, peaks, task.effort_limits, strict=True):
+    assert task.quantities is not None
+    found = peaks(spline, task.quantities)
+    for name, unit, peak, limit in zip(
+        task.quantities.names, task.quantities.units, found.upper, task.quantities.upper, strict=True
+    ):
         if not peak <= limit:
             raise LimitViolatedError(
-                f"{name} needs up to {peak:.4g}, the limit is {limit:g}; allow more time or raise the limit"
+                f"{name} needs up to {peak:.4g} {unit}, the limit is {limit:g} {unit}; "
+                "allow more time or raise the limit"
             )
     return spline
 
@@ -92,39 +97,31 @@ def _move(study: Study, plant: Plant, k: int, start: float, goal: float, clock: 
 def _task(study: Study, plant: Plant, k: int, start: float, goal: float) -> Task:
     section, limits = study.reference, study.reference.limits
     load = max(study.uncertainty.load_force_n, key=abs)
-    function = effort(plant, load)
+    column, running = effort(plant, load)
     bounded = [getattr(limits, name) for name in _LIMIT_OF]
     energy = section.objective == "energy" and section.kind == "bspline"
+    given = section.durations_s[k] if section.durations_s else section.longest_s
     return Task(
-        start=start,
-        goal=goal,
+        waypoints=(Waypoint(value=np.array([start])), Waypoint(value=np.array([goal]))),
         limits=MotionLimits(
             speed=limits.speed_m_s,
             acceleration=limits.acceleration_m_s2,
             jerk=limits.jerk_m_s3,
             position=plant.stroke,
         ),
-        effort=function,
-        effort_names=EFFORTS,
-        effort_limits=tuple(1e9 if value is None else value for value in bounded),
-        enclose=enclosure(function),
-        objective="energy" if energy else "time",
-        longest=section.durations_s[k] if section.durations_s else section.longest_s,
+        quantities=Quantities(
+            function=column,
+            names=tuple(name for name, _ in EFFORTS),
+            units=tuple(unit for _, unit in EFFORTS),
+            lower=np.full(len(EFFORTS), -np.inf),
+            upper=np.array([np.inf if value is None else value for value in bounded]),
+            enclose=enclosure(column),
+        ),
+        cost=Cost(time=0.0, running=running, names=("energy",), weights=(1.0,)) if energy else Cost(),
+        duration=given if energy else None,
+        longest=given,
         spans=section.spans,
     )
-
-
-def enclosure(function: ca.Function) -> Callable[[list[tuple[float, float]]], list[float]]:
-    """Rigorous upper bounds of an effort function over ranges of position … jerk."""
-    names = ("x", "v", "a", "j")
-    z = ca.SX.sym("z", 4)
-    expression = from_casadi(ca.Function("flat", [z], [function(z[0], z[1], z[2], z[3])[0]]), names)
-
-    def bound(ranges: list[tuple[float, float]]) -> list[float]:
-        box = {name: Interval(low, high) for name, (low, high) in zip(names, ranges, strict=True)}
-        return [interval.high for interval in enclose(expression, box)]
-
-    return bound
 
 
 def effort_table(study: Study, plant: Plant, reference: Reference) -> list[dict[str, float | str | None]]:
@@ -139,7 +136,7 @@ def effort_table(study: Study, plant: Plant, reference: Reference) -> list[dict[
         rows.append({"quantity": name, "unit": unit, "peak": max(map(abs, bounds[order])), "limit": limit})
     load = max(study.uncertainty.load_force_n, key=abs)
     t = np.linspace(0.0, reference.duration, 4001)
-    values = np.array(effort(plant, load).map(t.size)(*(row[None, :] for row in reference(t)))[0])
+    values = np.array(effort(plant, load)[0].map(t.size)(*(row[None, :] for row in reference(t))))
     sampled = [np.abs(values[0]).max(), np.abs(values[2]).max(), values[4].max()]
     for peak, (name, unit) in zip(sampled, (("torque", "N m"), ("current", "A"), ("voltage", "V")), strict=True):
         limit = getattr(limits, {"torque": "torque_nm", "current": "current_a", "voltage": "voltage_v"}[name])

@@ -1,5 +1,6 @@
 """Stability: bounds, gain conditions and certificates of strict-feedback loops, and their stand-alone checker."""
 
+from .arrays import enclose_many as enclose_many
 from .certificate import Certificate as Certificate
 from .certificate import Failure as Failure
 from .composition import Composition as Composition

@@ -1,4 +1,4 @@
-"""Minimum-time and minimum-energy motions of one axis by direct collocation on a B-spline."""
+"""Optimal motions by direct collocation on B-splines, verified for all t, repaired where they are not inside."""
 
 from __future__ import annotations
 
@@ -8,229 +8,187 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .limits import Enclosure, LimitViolatedError, MotionLimits, effort_peaks
-from .quintic import quintic, shortest_duration
-from .spline import DEGREE, Spline, clamped_knots
+from .diagnosis import at_rest, refusal, relaxed
+from .guess import Guess, guesses, straight
+from .limits import LimitViolatedError, violations
+from .program import POINTS, TIGHTENING, Program, build, gauss
+from .quantity import Peaks, peaks
+from .solver import assembled, bounds, solver_of
+from .spline import Spline, clamped_knots
+from .task import Cost, Task
 
 Array = NDArray[np.float64]
 
-OBJECTIVES = ("time", "energy")
-#: Collocation points in each span at which the effort limits are imposed.
-POINTS = 3
+#: Programs solved at the most until every quantity is inside its limits between the collocation points.
+ROUNDS = 8
+#: How much further than the excess a limit is tightened where the motion left it.
+FORWARD = 1.2
 #: A motion longer than this, s, is not searched for.
 LONGEST = 1e4
-#: Every limit is kept smaller by this share in the program, so that what the solver's tolerance leaves is inside.
-TIGHTENING = 1e-4
-
-
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """A rest-to-rest move of one axis.
-
-    Attributes:
-        start: First position, m.
-        goal: Last position, m.
-        limits: Limits of the motion; they hold for all t.
-        effort: CasADi function (x, x', x'', x''') -> column of effort quantities, and the running cost as its second
-            output (W or (N m)²; for the energy objective).
-        effort_names: Name and unit of each effort quantity.
-        effort_limits: Largest value of each effort quantity.
-        enclose: Upper bounds of the effort quantities over ranges, to verify them between collocation points.
-        objective: "time" or "energy".
-        longest: Longest admissible duration, s; the fixed duration of the energy objective.
-        spans: Number of spline spans.
-    """
-
-    start: float
-    goal: float
-    limits: MotionLimits
-    effort: Any
-    effort_names: tuple[str, ...]
-    effort_limits: tuple[float, ...]
-    enclose: Enclosure
-    objective: str = "time"
-    longest: float = 60.0
-    spans: int = 24
-
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """A solved move.
+    """A solved task.
 
     Attributes:
-        spline: The motion; respects every limit for all t.
-        cost: Value of the objective, s or the integral of the running cost.
-        effort_peaks: Proved upper bounds on the effort quantities.
-        rounds: Programs solved until the effort limits held between the collocation points.
+        spline: The motion; it respects every limit for all t.
+        arrivals: Times at the waypoints after the first, s.
+        cost: Value of the weighted cost.
+        parts: Integrals that the cost weighs: "time", "jerk", and the task's running costs.
+        peaks: Bounds of the quantities for all t; None where there are none.
+        rounds: Programs solved until the limits held between the collocation points.
+        iterations: Iterations of the solver, all rounds together.
     """
 
     spline: Spline
+    arrivals: tuple[float, ...]
     cost: float
-    effort_peaks: tuple[float, ...]
+    parts: dict[str, float]
+    peaks: Peaks | None
     rounds: int
+    iterations: int
 
 
-def solve(task: Task, begin: float = 0.0) -> Motion:
-    """Solve a move and verify it for all t; tighten the effort limits and solve again where it is not inside.
+def solve(task: Task, begin: float = 0.0, guess: Guess | None = None) -> Motion:
+    """Solve a task and verify the motion for all t; tighten limits that it leaves between the points, and solve again.
 
     Args:
-        task: The move.
+        task: The task.
         begin: Time of the first knot, s.
+        guess: Where the search starts; by default straight lines between the waypoints, and bent ones if that fails.
 
     Returns:
         The motion.
 
     Raises:
-        LimitViolatedError: no motion inside the limits was found.
+        LimitViolatedError: no motion inside the limits was found. The message says which limit, where, by how much,
+            and what would do.
 
-    Not guaranteed: global optimality.
+    References:
+        C. R. Hargraves and S. W. Paris (1987), Journal of Guidance 10, 338-342 (direct collocation); C. de Boor
+        (1978), A Practical Guide to Splines, ch. X and XI.
+
+    Not guaranteed: global optimality. A bound by control points is conservative by the distance between polygon and
+    curve, which falls with the square of the number of spans.
     """
-    low, high = task.limits.position
-    for point in (task.start, task.goal):
-        if not low <= point <= high:
-            raise LimitViolatedError(f"position {point:g} m leaves the stroke {low:g}…{high:g} m; move the waypoint")
-    share = 1.0
-    peaks: list[float] = []
-    for rounds in range(1, 6):
-        unit, duration, cost = _program(task, share)
-        spline = Spline(knots=begin + duration * clamped_knots(0.0, 1.0, task.spans), coefficients=unit)
-        peaks = effort_peaks(spline, task.enclose, task.effort_limits)
-        if all(peak <= limit for peak, limit in zip(peaks, task.effort_limits, strict=True)):
-            return Motion(spline=spline, cost=cost, effort_peaks=tuple(peaks), rounds=rounds)
-        share *= 0.999 / max(peak / limit for peak, limit in zip(peaks, task.effort_limits, strict=True))
-    worst = int(np.argmax(np.array(peaks) / np.array(task.effort_limits)))
-    raise LimitViolatedError(
-        f"{task.effort_names[worst]} cannot be kept under {task.effort_limits[worst]:g} between the knots: "
-        f"{peaks[worst]:.4g} remained; raise the limit or use more spans"
-    )
-
-
-def derivative_matrices(spans: int) -> list[Array]:
-    """Maps from control points to the control points of derivatives 0…3, on unit time."""
-    knots = clamped_knots(0.0, 1.0, spans)
-    maps = [np.eye(len(knots) - DEGREE - 1)]
-    for degree in range(DEGREE, DEGREE - 3, -1):
-        step = np.diff(np.eye(len(maps[-1])), axis=0)
-        maps.append((degree / (knots[degree + 1 : -1] - knots[1 : -degree - 1]))[:, None] * step @ maps[-1])
-        knots = knots[1:-1]
-    return maps
-
-
-def _basis(spans: int, points: Array) -> list[Array]:
-    """Values of the basis and its derivatives at unit times. Four arrays of shape (points, k)."""
-    knots = clamped_knots(0.0, 1.0, spans)
-    identity = np.eye(len(knots) - DEGREE - 1)
-    columns = [Spline(knots=knots, coefficients=row) for row in identity]
-    return [np.stack([column(points, order) for column in columns], axis=1) for order in range(4)]
-
-
-def _program(task: Task, share: float) -> tuple[Array, float, float]:
-    import casadi as ca
-
-    limits, count = task.limits, task.spans + DEGREE
-    free = ca.MX.sym("c", count - 6)
-    duration = ca.MX.sym("T")
-    points = ca.vertcat(*[task.start] * 3, free, *[task.goal] * 3)
-    maps = derivative_matrices(task.spans)
-    constraints, upper = [], []
-    for order, limit in ((1, limits.speed), (2, limits.acceleration), (3, limits.jerk)):
-        rows = ca.DM(maps[order]) @ points / (limit * (1 - TIGHTENING) * duration**order)
-        constraints.append(rows)
-        upper += [1.0] * rows.numel()
-    nodes, weights = _gauss(task.spans)
-    basis = [ca.DM(b) for b in _basis(task.spans, nodes)]
-    curves = [(b @ points) / duration**order for order, b in enumerate(basis)]
-    mapped = task.effort.map(len(nodes))
-    effort, running = mapped(*(curve.T for curve in curves))
-    scale = np.array(task.effort_limits) * share * (1 - TIGHTENING)
-    constraints.append(ca.vec(effort / ca.repmat(ca.DM(scale), 1, len(nodes))))
-    energy = duration * ca.dot(ca.DM(weights), running.T)
-    fixed = task.objective == "energy"
-    quickest = shortest_duration(task.goal - task.start, limits.speed, limits.acceleration, limits.jerk)
-    guess = task.longest if fixed else min(task.longest, 1.5 * quickest)
-    lowest, highest = task.limits.position
-    starts = _initial(task, count)
-    lower_constraints = [-1.0] * len(upper) + [-np.inf] * (len(nodes) * len(scale))
-    upper += [1.0] * (len(nodes) * len(scale))
-    objective = energy / max(_energy_scale(task, guess, starts, basis, weights), 1e-9) if fixed else duration
-    solver = ca.nlpsol(
-        "motion", "ipopt",
-        {"x": ca.vertcat(free, duration), "f": objective, "g": ca.vertcat(*constraints)},
-        {"expand": True, "print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-9, "max_iter": 500}},
-    )  # fmt: skip
-    answer = solver(
-        x0=np.append(starts[3:-3], guess),
-        lbx=[lowest] * (count - 6) + [task.longest if fixed else min(0.05 * quickest, 0.5 * task.longest)],
-        ubx=[highest] * (count - 6) + [task.longest],
-        lbg=lower_constraints,
-        ubg=upper,
-    )
-    values = np.array(answer["x"]).ravel()
-    names = ["speed", "acceleration", "jerk", *task.effort_names]
-    _refuse(solver, np.array(answer["g"]).ravel(), np.array(upper), names, [len(m) for m in maps[1:]], len(scale), task)
-    coefficients = np.concatenate([[task.start] * 3, np.clip(values[:-1], lowest, highest), [task.goal] * 3])
-    cost = (
-        float(values[-1])
-        if not fixed
-        else float(answer["f"]) * max(_energy_scale(task, guess, starts, basis, weights), 1e-9)
-    )
-    return coefficients, float(values[-1]), cost
-
-
-def _refuse(
-    solver: Any, values: Array, upper: Array, names: list[str], counts: list[int], efforts: int, task: Task
-) -> None:
-    """Raise with the most violated limit unless every constraint of the program holds."""
-    excess, motion = values - upper, sum(counts)
-    excess[:motion] = np.abs(values[:motion]) - 1.0
-    if solver.stats()["success"] and excess.max() <= TIGHTENING:
-        return
-    if task.longest < LONGEST:
-        shortest = _shortest(task)
-        if shortest is not None and shortest > task.longest:
-            raise LimitViolatedError(
-                f"no motion from {task.start:g} to {task.goal:g} m within {task.longest:g} s respects the limits; "
-                f"{1.001 * shortest:.4g} s would do"
-            )
-    worst = int(excess.argmax())
-    which = (
-        int(np.searchsorted(np.cumsum(counts), worst, side="right"))
-        if worst < motion
-        else 3 + (worst - motion) % efforts
-    )
-    raise LimitViolatedError(
-        f"no motion from {task.start:g} to {task.goal:g} m within {task.longest:g} s respects the limits: "
-        f"{names[which]} would be {100 * max(excess[worst], 0.0):.3g} % over its limit; "
-        f"allow more time or raise the {names[which]} limit"
-    )
+    _reject_places(task)
+    given = [guess] if guess is not None else list(guesses(task))
+    first = _Attempt(task, given[0])
+    motion = first.run(begin)
+    if motion is not None:
+        return motion
+    relaxation = relaxed(task, given[0])
+    starts = given[1:] if relaxation is None or relaxation.widened else [relaxation.guess, *given[1:]]
+    for start in starts:
+        motion = _Attempt(task, start).run(begin)
+        if motion is not None:
+            return motion
+    raise refusal(task, relaxation, first.failure, _shortest(task))
 
 
 def _shortest(task: Task) -> float | None:
-    """Duration of the quickest motion inside the limits, s; None where there is none."""
-    try:
-        return solve(replace(task, objective="time", longest=LONGEST)).spline.end
-    except LimitViolatedError:
+    """Duration of the quickest motion inside the limits, s; None where none was found."""
+    longer = replace(task, cost=Cost(), duration=None, longest=LONGEST)
+    motion = _Attempt(longer, straight(longer)).run(0.0)
+    return None if motion is None else motion.parts["time"]
+
+
+def _reject_places(task: Task) -> None:
+    low, high = task.limits.room
+    for waypoint in task.waypoints:
+        for k, value in enumerate(waypoint.known):
+            if not np.isnan(value) and not low[k] <= value <= high[k]:
+                name, unit = f"{task.limits.names[k]} position".strip(), task.limits.units[k]
+                raise LimitViolatedError(
+                    f"{name} {value:g} {unit} leaves the stroke {low[k]:g}…{high[k]:g} {unit}; move the waypoint"
+                )
+    for which, waypoint in (("start", task.waypoints[0]), ("goal", task.waypoints[-1])):
+        if not np.isnan(waypoint.known).any():
+            over = at_rest(task, waypoint.known)
+            if over:
+                raise LimitViolatedError(f"no motion: at rest at the {which}, {over}")
+
+
+class _Attempt:
+    """One search from one guess."""
+
+    def __init__(self, task: Task, start: Guess) -> None:
+        self.task, self.start = task, start
+        self.iterations = 0
+        self.failure = ""
+
+    def run(self, begin: float) -> Motion | None:
+        task = self.task
+        program = build(task, 1.0 / max(_first_cost(task, self.start), 1e-12))
+        solver = solver_of(program)
+        x = program.shape.packed(list(self.start.points), self.start.durations)
+        upper, lower = program.upper.copy(), program.lower.copy()
+        known: dict[str, Any] = {}
+        for rounds in range(1, ROUNDS + 1):
+            answer = solver(x0=x, lbg=lower, ubg=upper, **bounds(task, program, self.start), **known)
+            self.iterations += solver.stats()["iter_count"]
+            x = np.array(answer["x"]).ravel()
+            if not solver.stats()["success"]:
+                self.failure = str(solver.stats()["return_status"])
+                return None
+            spline, arrivals = assembled(task, program.shape, x, begin)
+            found = peaks(spline, task.quantities) if task.quantities is not None else None
+            if not violations(spline, task.limits) and (found is None or found.inside):
+                return self._motion(spline, arrivals, found, rounds)
+            self.failure = "limits between the collocation points"
+            if found is not None:
+                _tighten(task, program, found, lower, upper)
+            known = {"lam_x0": answer["lam_x"], "lam_g0": answer["lam_g"]}
         return None
 
-
-def _initial(task: Task, count: int) -> Array:
-    """Control points of a quintic move as the first guess."""
-    from scipy.interpolate import make_lsq_spline
-
-    move = quintic(task.start, task.goal, 0.0, 1.0)
-    times = np.linspace(0.0, 1.0, 8 * count)
-    fitted = make_lsq_spline(times, move(times), clamped_knots(0.0, 1.0, task.spans), DEGREE)
-    return np.asarray(fitted.c)
-
-
-def _gauss(spans: int) -> tuple[Array, Array]:
-    """Gauss-Legendre points and weights in each span, on unit time."""
-    local, weight = np.polynomial.legendre.leggauss(POINTS)
-    starts = np.arange(spans)[:, None]
-    return ((starts + (local + 1) / 2) / spans).ravel(), np.tile(weight / (2 * spans), spans)
+    def _motion(self, spline: Spline, arrivals: tuple[float, ...], found: Peaks | None, rounds: int) -> Motion:
+        parts = integrals(self.task, spline)
+        weights = {"time": self.task.cost.time, "jerk": self.task.cost.jerk}
+        weights |= dict(zip(self.task.cost.names, self.task.cost.weights, strict=True))
+        return Motion(
+            spline=spline, arrivals=arrivals, cost=sum(weights[name] * value for name, value in parts.items()),
+            parts=parts, peaks=found, rounds=rounds, iterations=self.iterations,
+        )  # fmt: skip
 
 
-def _energy_scale(task: Task, duration: float, points: Array, basis: list[Any], weights: Array) -> float:
-    curves = [np.asarray(b) @ points / duration**order for order, b in enumerate(basis)]
-    running = np.array(task.effort.map(len(weights))(*(curve[None, :] for curve in curves))[1]).ravel()
-    return float(duration * abs(weights @ running))
+def integrals(task: Task, spline: Spline) -> dict[str, float]:
+    """Duration, integral of the squared jerk, and integrals of the running costs, by Gauss points in every span."""
+    edges = np.unique(spline.knots)
+    local, weights = gauss(1)
+    times = (edges[:-1, None] + np.diff(edges)[:, None] * local).ravel()
+    shares = (np.diff(edges)[:, None] * weights).ravel()
+    jerk = spline(times, 3).reshape(len(times), -1) if spline.degree >= 3 else np.zeros((len(times), 1))
+    found = {"time": spline.end - spline.start, "jerk": float(shares @ (jerk**2).sum(axis=1))}
+    if task.cost.running is not None:
+        curves = [spline(times, order).reshape(len(times), -1).T for order in range(4)]
+        values = np.array(task.cost.running.map(len(times))(*curves))
+        found |= {name: float(shares @ row) for name, row in zip(task.cost.names, values, strict=True)}
+    return found
+
+
+def _first_cost(task: Task, start: Guess) -> float:
+    """Size of the cost at the guess."""
+    knots = [clamped_knots(0.0, float(t), task.spans, task.degree) for t in start.durations]
+    total = 0.0
+    for own, coefficients in zip(knots, start.points, strict=True):
+        parts = integrals(task, Spline(knots=own, coefficients=coefficients))
+        weights = {"time": task.cost.time, "jerk": task.cost.jerk}
+        weights |= dict(zip(task.cost.names, task.cost.weights, strict=True))
+        total += sum(weights[name] * abs(value) for name, value in parts.items())
+    return total
+
+
+def _tighten(task: Task, program: Program, found: Peaks, lower: Array, upper: Array) -> None:
+    """Move the limits of a quantity inwards at the points of the spans where it is outside."""
+    given = task.quantities
+    assert given is not None
+    kept = np.flatnonzero(np.isfinite(given.lower) | np.isfinite(given.upper))
+    excess = FORWARD * found.excess / given.scale[:, None] + np.where(found.excess > 0, TIGHTENING, 0.0)
+    beside = np.pad(excess, ((0, 0), (1, 1)))
+    excess = np.maximum(excess, np.maximum(beside[:, :-2], beside[:, 2:]) / 2)[kept]
+    phases = np.split(excess, task.phases, axis=1)
+    # each phase: its first point, those of its spans, its last point; rest at an end leaves nothing to move
+    per_node = [np.pad(np.repeat(own, POINTS, axis=1), ((0, 0), (1, 1))) for own in phases]
+    change = np.concatenate(per_node, axis=1).T.ravel()
+    upper[-change.size :] -= change
+    lower[-change.size :] += change

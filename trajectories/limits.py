@@ -1,24 +1,19 @@
-"""Limits for all t: what holds on control points holds everywhere; other limits are enclosed span by span."""
+"""Limits of a motion and of its derivatives: what holds on control points holds for all t."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from .spline import DEGREE, Spline
+from .spline import Spline
 
 Array = NDArray[np.float64]
 
-#: How often a span may be bisected while its effort is not yet shown to be inside its limit.
-DEPTH = 10
-
-#: Encloses effort quantities over ranges of position, speed, acceleration and jerk: (4 ranges) -> upper bounds.
-Enclosure = Callable[[list[tuple[float, float]]], list[float]]
+#: Derivatives that have limits, by order.
+ORDERS = {1: "speed", 2: "acceleration", 3: "jerk"}
 
 
 class LimitViolatedError(Exception):
@@ -27,93 +22,61 @@ class LimitViolatedError(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class MotionLimits:
-    """Limits of one axis.
+    """Limits of n coordinates. A number stands for all of them.
 
     Attributes:
-        speed: Largest |x'|, m/s.
-        acceleration: Largest |x''|, m/s².
-        jerk: Largest |x'''|, m/s³.
-        position: Admissible positions, m.
+        position: Lowest and highest positions, [m] or [rad]. Each a number or shape (n,).
+        speed: Largest |x'|, [m/s] or [rad/s]. A number or shape (n,); infinite for none.
+        acceleration: Largest |x''|.
+        jerk: Largest |x'''|.
+        names: Names of the coordinates, for messages.
+        units: Their units.
     """
 
-    speed: float
-    acceleration: float
-    jerk: float
-    position: tuple[float, float]
+    position: tuple[ArrayLike, ArrayLike]
+    speed: ArrayLike = np.inf
+    acceleration: ArrayLike = np.inf
+    jerk: ArrayLike = np.inf
+    names: tuple[str, ...] = ("",)
+    units: tuple[str, ...] = ("m",)
+
+    def of(self, order: int) -> Array:
+        """The largest size of a derivative, for each coordinate. Shape (n,)."""
+        return np.broadcast_to(np.asarray(getattr(self, ORDERS[order]), dtype=float), len(self.names))
+
+    @property
+    def room(self) -> tuple[Array, Array]:
+        """Lowest and highest position of each coordinate. Each shape (n,)."""
+        low, high = (np.broadcast_to(np.asarray(end, dtype=float), len(self.names)) for end in self.position)
+        return low, high
+
+    def title(self, order: int, index: int) -> str:
+        """What a limit is called, such as "lift speed"."""
+        return f"{self.names[index]} {ORDERS[order]}".strip()
+
+    def unit(self, order: int, index: int) -> str:
+        """The unit of a derivative, such as "rad/s^2"."""
+        return f"{self.units[index]}/s" + (f"^{order}" if order > 1 else "")
 
 
 def violations(spline: Spline, limits: MotionLimits) -> list[str]:
     """Motion limits that the control points do not respect, as text; empty where all hold for all t."""
     found = []
-    low, high = spline.bounds(0)
-    if low < limits.position[0] or high > limits.position[1]:
-        found.append(
-            f"position {low:.4g}…{high:.4g} m leaves the stroke {limits.position[0]:g}…{limits.position[1]:g} m"
-        )
-    for order, (name, limit, unit) in enumerate(
-        (
-            ("speed", limits.speed, "m/s"),
-            ("acceleration", limits.acceleration, "m/s^2"),
-            ("jerk", limits.jerk, "m/s^3"),
-        ),
-        1,
-    ):
-        size = max(abs(edge) for edge in spline.bounds(order))
-        if not size <= limit * (1 + 1e-9):
-            found.append(f"{name} {size:.4g} {unit} is over the limit {limit:g} {unit}")
+    low, high = _ends(spline, 0)
+    for k, (least, most) in enumerate(zip(*limits.room, strict=True)):
+        if not (low[k] >= least and high[k] <= most):
+            name = f"{limits.names[k]} position".strip()
+            unit = limits.units[k]
+            found.append(f"{name} {low[k]:.4g}…{high[k]:.4g} {unit} leaves the stroke {least:g}…{most:g} {unit}")
+    for order in ORDERS:
+        low, high = _ends(spline, order)
+        for k, limit in enumerate(limits.of(order)):
+            size, unit = max(abs(low[k]), abs(high[k])), limits.unit(order, k)
+            if not size <= limit * (1 + 1e-9):
+                found.append(f"{limits.title(order, k)} {size:.4g} {unit} is over the limit {limit:g} {unit}")
     return found
 
 
-def effort_peaks(spline: Spline, enclose: Enclosure, limits: Sequence[float]) -> list[float]:
-    """Upper bounds on effort quantities for all t, by bisection of the spans where the limits are not yet shown.
-
-    Args:
-        spline: The motion.
-        enclose: Upper bounds over ranges of position … jerk, rigorous if the caller's arithmetic is.
-        limits: A piece is bisected while a bound is over its limit, `DEPTH` times at the most.
-
-    Returns:
-        One upper bound for each quantity; over the limit only where bisection could not bring it under.
-    """
-    peaks = [-math.inf] * len(limits)
-    work = [(points, width, 0) for points, width in bezier_spans(spline)]
-    while work:
-        points, width, depth = work.pop()
-        bounds = enclose(_ranges(points, width))
-        if depth < DEPTH and any(bound > limit for bound, limit in zip(bounds, limits, strict=True)):
-            left, right = _halves(points)
-            work += [(left, width / 2, depth + 1), (right, width / 2, depth + 1)]
-        else:
-            peaks = [max(peak, bound) for peak, bound in zip(peaks, bounds, strict=True)]
-    return peaks
-
-
-def bezier_spans(spline: Spline) -> list[tuple[Array, float]]:
-    """Bezier control points and the width of every span. Each shape (6,)."""
-    from scipy.interpolate import insert
-
-    tck: Any = (spline.knots, np.append(spline.coefficients, np.zeros(DEGREE + 1)), DEGREE)
-    edges = np.unique(spline.knots)
-    for knot in edges[1:-1]:
-        tck = insert(knot, tck, m=DEGREE - 1)
-    points = np.asarray(tck[1])
-    return [(points[DEGREE * k : DEGREE * k + 6], float(w)) for k, w in enumerate(np.diff(edges))]
-
-
-def _ranges(points: Array, width: float) -> list[tuple[float, float]]:
-    """Ranges of position … jerk of one Bezier piece, from the control points of its derivatives."""
-    result = []
-    for order in range(4):
-        result.append((float(points.min()), float(points.max())))
-        points = (DEGREE - order) * np.diff(points) / width
-    return result
-
-
-def _halves(points: Array) -> tuple[Array, Array]:
-    """De Casteljau's subdivision at the middle."""
-    left, right = [points[0]], [points[-1]]
-    while len(points) > 1:
-        points = (points[:-1] + points[1:]) / 2
-        left.append(points[0])
-        right.append(points[-1])
-    return np.array(left), np.array(right[::-1])
+def _ends(spline: Spline, order: int) -> tuple[Any, Any]:
+    low, high = spline.bounds(order)
+    return np.atleast_1d(low), np.atleast_1d(high)

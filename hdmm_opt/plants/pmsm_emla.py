@@ -109,6 +109,19 @@ def _mechanics(v: Any, torque: Any, load: Any, q: Mapping[str, Any]) -> tuple[An
     return mass, driving / (1 + loss * (r * q["load_mass"] / mass))
 
 
+def shaft_torque(force: Any, speed: Any, acceleration: Any, values: Mapping[str, Any]) -> Any:
+    """Motor torque of a motion of the rod against a force, N m.
+
+    Args:
+        force: Force on the rod without its friction, N; inertia of what it moves included.
+        speed: Speed of the rod, m/s.
+        acceleration: Its acceleration, m/s².
+        values: Values of the mechanical parameters by name; the load mass is not used.
+    """
+    inertia, driving = _mechanics(speed, 0.0, force, {**values, "load_mass": 0.0})
+    return inertia * acceleration - driving
+
+
 def _symbols(states: int, inputs: int, known: Mapping[str, Parameter]) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
     import casadi as ca
 
@@ -188,10 +201,12 @@ def _voltage_level(known: Mapping[str, Parameter]) -> Plant:
     )  # fmt: skip
 
 
-EFFORTS = ("torque [N m]", "negative torque [N m]", "current [A]", "negative current [A]", "voltage [V]")
+EFFORTS = (
+    ("torque", "N m"), ("negative torque", "N m"), ("current", "A"), ("negative current", "A"), ("voltage", "V"),
+)  # fmt: skip
 
 
-def effort(plant: Plant, load: float) -> Any:
+def effort(plant: Plant, load: float) -> tuple[Any, Any]:
     """What a motion asks of the motor at nominal parameters and a constant load.
 
     Args:
@@ -199,8 +214,8 @@ def effort(plant: Plant, load: float) -> Any:
         load: Load on the rod, N.
 
     Returns:
-        CasADi function (position, speed, acceleration, jerk) -> (column of `EFFORTS`, electrical power in W). The
-        current's rate is that of the acceleration torque; the rate of the friction torque is left out.
+        Two CasADi functions of (position, speed, acceleration, jerk): the column of `EFFORTS`, and the electrical
+        power in W. The current's rate is that of the acceleration torque; the rate of the friction torque is left out.
     """
     import casadi as ca
 
@@ -220,4 +235,4 @@ def effort(plant: Plant, load: float) -> Any:
     u_d = -inductance * speed * current
     power = torque * v / known["transmission"].value + 1.5 * resistance * current**2
     column = ca.vertcat(torque, -torque, current, -current, ca.sqrt(u_q**2 + u_d**2 + 1e-12))
-    return ca.Function("effort", [x, v, a, j], [column, power], ["x", "v", "a", "j"], ["effort", "power"])
+    return ca.Function("effort", [x, v, a, j], [column]), ca.Function("power", [x, v, a, j], [power])

@@ -1,0 +1,155 @@
+"""Many boxes at once: enclosures of an expression over arrays of intervals, every operation rounded outwards."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .expression import Expression, run
+
+Array = NDArray[np.float64]
+Pair = tuple[Array, Array]
+
+#: Beyond this size a float does not know its phase.
+_FAR = 1e5
+#: Units in the last place by which a result of the math library is widened: it is not correctly rounded.
+_LIBRARY = 4
+
+
+def enclose_many(expression: Expression, ranges: Mapping[str, Pair]) -> tuple[Array, Array]:
+    """Enclosures of the outputs over many boxes, by natural interval evaluation.
+
+    Args:
+        expression: The operations.
+        ranges: Lower and upper ends of each input, one entry for each box. Shapes (boxes,).
+
+    Returns:
+        Lower and upper ends. Each shape (outputs, boxes); infinite where a divisor may vanish, or the argument of a
+        root may be negative.
+
+    References:
+        Moore, Kearfott and Cloud (2009), Introduction to Interval Analysis, ch. 2.
+    """
+    count = len(next(iter(ranges.values()))[0])
+    with np.errstate(all="ignore"):
+        table = run(expression, ranges.__getitem__, _OPERATORS, _constant)
+    ends = [[np.broadcast_to(end, count) for end in table[index]] for index in expression.outputs]
+    return np.stack([low for low, _ in ends]), np.stack([high for _, high in ends])
+
+
+def _constant(value: float) -> Pair:
+    point = np.array(value)
+    return point, point
+
+
+def _outwards(low: Any, high: Any, steps: int = 1) -> Pair:
+    for _ in range(steps):
+        low, high = np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
+    return low, high
+
+
+def _add(a: Pair, b: Pair) -> Pair:
+    return _whole(*_outwards(a[0] + b[0], a[1] + b[1]))
+
+
+def _sub(a: Pair, b: Pair) -> Pair:
+    return _whole(*_outwards(a[0] - b[1], a[1] - b[0]))
+
+
+def _mul(a: Pair, b: Pair) -> Pair:
+    if b[0] is b[1] or a[0] is a[1]:  # a number
+        ends = (a[0] * b[0], a[1] * b[1])
+    else:
+        ends = (a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1])
+    if any(np.isnan(end).any() for end in ends):  # 0 times infinity: the member 0 makes it 0
+        ends = tuple(np.where(np.isnan(a[i] * b[j]), 0.0, a[i] * b[j]) for i in (0, 1) for j in (0, 1))
+    low, high = ends[0], ends[0]
+    for end in ends[1:]:
+        low, high = np.minimum(low, end), np.maximum(high, end)
+    return _outwards(low, high)
+
+
+def _div(a: Pair, b: Pair) -> Pair:
+    inverse = _outwards(1.0 / b[1], 1.0 / b[0])
+    low, high = _mul(a, inverse)
+    holds = (b[0] <= 0.0) & (b[1] >= 0.0)
+    return np.where(holds, -np.inf, low), np.where(holds, np.inf, high)
+
+
+def _neg(a: Pair) -> Pair:
+    return -a[1], -a[0]
+
+
+def _square(a: Pair) -> Pair:
+    small, large = _size(a)
+    low, high = _outwards(small * small, large * large)
+    return np.maximum(low, 0.0), high
+
+
+def _size(a: Pair) -> Pair:
+    """The range of the absolute value."""
+    first, second = np.abs(a[0]), np.abs(a[1])
+    return np.where((a[0] <= 0.0) & (a[1] >= 0.0), 0.0, np.minimum(first, second)), np.maximum(first, second)
+
+
+def _sqrt(a: Pair) -> Pair:
+    low, high = _outwards(np.sqrt(a[0]), np.sqrt(a[1]))
+    below = ~(a[0] >= 0.0)
+    return np.where(below, -np.inf, np.maximum(low, 0.0)), np.where(below, np.inf, high)
+
+
+def _tanh(a: Pair) -> Pair:
+    low, high = _outwards(np.tanh(a[0]), np.tanh(a[1]), _LIBRARY)
+    return np.maximum(low, -1.0), np.minimum(high, 1.0)
+
+
+def _exp(a: Pair) -> Pair:
+    low, high = _outwards(np.minimum(np.exp(a[0]), 8e307), np.exp(a[1]), _LIBRARY)
+    return np.maximum(low, 0.0), high
+
+
+def _sin(a: Pair) -> Pair:
+    first, second = np.sin(a[0]), np.sin(a[1])
+    low, high = _outwards(np.minimum(first, second), np.maximum(first, second), _LIBRARY)
+    low = np.where(_passes(a, -math.pi / 2), -1.0, np.maximum(low, -1.0))
+    high = np.where(_passes(a, math.pi / 2), 1.0, np.minimum(high, 1.0))
+    far = ~((np.maximum(np.abs(a[0]), np.abs(a[1])) <= _FAR) & (a[1] - a[0] < 2 * math.pi))
+    return np.where(far, -1.0, low), np.where(far, 1.0, high)
+
+
+def _cos(a: Pair) -> Pair:
+    quarter = math.pi / 2
+    return _sin(_add(a, (np.array(math.nextafter(quarter, 0)), np.array(math.nextafter(quarter, 2)))))
+
+
+def _passes(a: Pair, phase: float) -> Any:
+    """Whether phase + 2πk may lie inside, with room for rounding."""
+    room = 1e-9
+    return np.ceil((a[0] - phase - room) / (2 * math.pi)) <= np.floor((a[1] - phase + room) / (2 * math.pi))
+
+
+def _whole(low: Any, high: Any) -> Pair:
+    """Ends that cannot be told, ∞ - ∞, become infinite."""
+    return np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)
+
+
+_OPERATORS: dict[str, Callable[..., Pair]] = {
+    "add": _add,
+    "sub": _sub,
+    "mul": _mul,
+    "div": _div,
+    "neg": _neg,
+    "sq": _square,
+    "sqrt": _sqrt,
+    "tanh": _tanh,
+    "sin": _sin,
+    "cos": _cos,
+    "exp": _exp,
+    "abs": _size,
+    "min": lambda a, b: (np.minimum(a[0], b[0]), np.minimum(a[1], b[1])),
+    "max": lambda a, b: (np.maximum(a[0], b[0]), np.maximum(a[1], b[1])),
+}

@@ -1,0 +1,72 @@
+"""Where the search for a motion starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .limits import ORDERS
+from .quintic import shortest_duration
+from .spline import clamped_knots, fitted
+from .task import Task
+
+Array = NDArray[np.float64]
+
+#: A first guess takes this much longer than the quickest move by the limits of the coordinates.
+EASE = 1.5
+#: Bends tried where straight lines fail, as shares of the room beside the line.
+BENDS = (0.0, 0.5, -0.5)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Guess:
+    """Control points and durations.
+
+    Attributes:
+        points: Control points of every phase. Each shape (k, n).
+        durations: Durations of the phases, s. Shape (phases,).
+    """
+
+    points: tuple[Array, ...]
+    durations: Array
+
+
+def guesses(task: Task) -> Iterator[Guess]:
+    """Moves along straight lines between the waypoints, then along bent ones."""
+    for bend in BENDS:
+        yield straight(task, bend)
+
+
+def straight(task: Task, bend: float = 0.0) -> Guess:
+    """Quintic moves between the waypoints, all coordinates at once.
+
+    Args:
+        task: The task.
+        bend: How far the middle leaves the line, as a share of the room to the limits of each coordinate.
+    """
+    low, high = task.limits.room
+    s = np.linspace(0.0, 1.0, 8 * (task.spans + task.degree))
+    law = (10 * s**3 - 15 * s**4 + 6 * s**5)[:, None]
+    knots = clamped_knots(0.0, 1.0, task.spans, task.degree)
+    points, durations = [], []
+    for before, after in zip(task.waypoints, task.waypoints[1:], strict=False):
+        line = before.guess + law * (after.guess - before.guess)
+        edge = np.where(bend > 0, high, low)
+        edge = np.where(np.isfinite(edge), edge, line)
+        path = line + abs(bend) * 4 * law * (1 - law) * (edge - line)
+        points.append(np.clip(fitted(s, path, knots, task.degree).coefficients, low, high))
+        durations.append(_duration(task, after.guess - before.guess))
+    share = task.duration / sum(durations) if task.duration else min(1.0, task.longest / sum(durations))
+    return Guess(points=tuple(points), durations=share * np.array(durations))
+
+
+def _duration(task: Task, distance: Array) -> float:
+    """Time for the coordinate that takes longest, s."""
+    limits = np.stack([task.limits.of(order) for order in ORDERS], axis=1)
+    quickest = max(
+        shortest_duration(float(d), *(float(v) for v in own)) for d, own in zip(distance, limits, strict=True)
+    )
+    return max(EASE * quickest, 1e-3 * task.longest)

@@ -1,0 +1,52 @@
+"""Where a tool may not be: half-spaces and balls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, kw_only=True)
+class HalfSpace:
+    """The points p with normal · p > offset are forbidden.
+
+    Attributes:
+        name: What stands there, such as "ground".
+        normal: Unit vector into the forbidden side. Shape (d,).
+        offset: Distance of the wall from the origin along the normal, m.
+    """
+
+    name: str
+    normal: tuple[float, ...]
+    offset: float
+
+    def clearance(self, point: Any) -> Any:
+        """Distance to the wall, m; negative beyond it. Symbols or numbers, shape (d,)."""
+        return self.offset - sum(n * point[i] for i, n in enumerate(self.normal))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ball:
+    """The points nearer than a radius to a centre are forbidden.
+
+    Attributes:
+        name: What stands there.
+        centre: Centre, m. Shape (d,).
+        radius: Radius, m, > 0.
+    """
+
+    name: str
+    centre: tuple[float, ...]
+    radius: float
+
+    def __post_init__(self) -> None:
+        if not self.radius > 0:
+            raise ValueError(f"a ball needs a positive radius: got {self.radius} m for {self.name}")
+
+    def clearance(self, point: Any) -> Any:
+        """(|p - c|² - r²) / 2r, m: smooth, the distance to the surface near it, and negative inside."""
+        squared = sum((point[i] - c) ** 2 for i, c in enumerate(self.centre))
+        return (squared - self.radius**2) / (2 * self.radius)
+
+
+Obstacle = HalfSpace | Ball

@@ -1,0 +1,137 @@
+"""Quantities that a motion asks for, such as torques and distances, and their bounds for all t."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bezier import Pieces, pieces
+from .spline import Spline
+
+Array = NDArray[np.float64]
+
+#: Lower and upper bounds of every quantity on every piece of a motion, each shape (q, pieces): rigorous if the
+#: arithmetic behind it is; infinite where it cannot tell.
+Enclosure = Callable[[Pieces], tuple[Array, Array]]
+
+#: How often a piece may be halved while a quantity is not yet shown to be inside its limits.
+DEPTH = 12
+#: A bound is sharpened until it takes no more than this share of the room that samples show.
+SHARPNESS = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantities:
+    """Functions of position, speed, acceleration and jerk that have limits.
+
+    Attributes:
+        function: CasADi function of four columns of shape (n,) -> column of shape (q,).
+        names: What each quantity is called.
+        units: Their units.
+        lower: Least admissible values; -inf for none. Shape (q,).
+        upper: Largest admissible values; inf for none. Shape (q,).
+        enclose: Bounds on a piece of a motion.
+    """
+
+    function: Any
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    lower: Array
+    upper: Array
+    enclose: Enclosure
+
+    @property
+    def scale(self) -> Array:
+        """Size of each quantity, from its limits. Shape (q,)."""
+        return sizes(self.lower, self.upper)
+
+    def values(self, spline: Spline, times: Array) -> Array:
+        """The quantities at given times. Shape (q, len(times))."""
+        curves = [np.atleast_2d(spline(times, order).T) if spline.degree >= order else 0.0 for order in range(4)]
+        curves = [np.broadcast_to(curve, curves[0].shape) for curve in curves]
+        return np.array(self.function.map(len(times))(*curves))
+
+
+def sizes(lower: Array, upper: Array) -> Array:
+    """The larger of the finite limits in size; 1 where they are 0 or infinite. Shape (q,)."""
+    ends = np.abs(np.stack([lower, upper]))
+    size = np.where(np.isfinite(ends), ends, 0.0).max(axis=0)
+    return np.where(size > 0, size, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peaks:
+    """Bounds of quantities over a motion.
+
+    Attributes:
+        lower: Lower bounds for all t. Shape (q,).
+        upper: Upper bounds for all t. Shape (q,).
+        excess: How far the bounds lie outside the limits, 0 where inside, on each span of the motion. Shape (q, spans).
+        lowest: Span in which each lower bound is reached. Shape (q,).
+        highest: Span in which each upper bound is reached. Shape (q,).
+    """
+
+    lower: Array
+    upper: Array
+    excess: Array
+    lowest: NDArray[np.int64]
+    highest: NDArray[np.int64]
+
+    @property
+    def inside(self) -> bool:
+        """True where every limit holds for all t."""
+        return not self.excess.any()
+
+
+def peaks(spline: Spline, quantities: Quantities) -> Peaks:
+    """Bounds of the quantities for all t: pieces are halved until the limits are shown, `DEPTH` times at the most.
+
+    Args:
+        spline: The motion.
+        quantities: What to bound, and the limits.
+
+    Returns:
+        The bounds; outside a limit only where halving could not bring them inside.
+    """
+    work = pieces(spline)
+    span, spans = np.arange(len(work.start)), len(work.start)
+    least, most = _targets(spline, work, quantities)
+    low, high = np.full((len(quantities.names), spans), np.inf), np.full((len(quantities.names), spans), -np.inf)
+    for depth in range(DEPTH + 1):
+        under, over = quantities.enclose(work)
+        below = (under < least[:, None]) & (over >= quantities.lower[:, None])  # and not outside all the way
+        above = (over > most[:, None]) & (under <= quantities.upper[:, None])
+        coarse = (below | above).any(axis=0) & (depth < DEPTH)
+        for rows, bound, keep in ((low, under, np.minimum), (high, over, np.maximum)):
+            keep.at(rows, (slice(None), span[~coarse]), bound[:, ~coarse])
+        if not coarse.any():
+            break
+        work, span = work.chosen(coarse).halved(), np.tile(span[coarse], 2)
+    outside = np.maximum(high - quantities.upper[:, None], quantities.lower[:, None] - low)
+    return Peaks(
+        lower=low.min(axis=1),
+        upper=high.max(axis=1),
+        excess=np.maximum(outside, 0.0),
+        lowest=low.argmin(axis=1),
+        highest=high.argmax(axis=1),
+    )
+
+
+def _targets(spline: Spline, work: Pieces, quantities: Quantities) -> tuple[Array, Array]:
+    """Bounds at which halving ends: a little beyond what samples take, and the limits where there is little room."""
+    times = (work.start[:, None] + work.width[:, None] * np.linspace(0.0, 1.0, 5)).ravel()
+    values = quantities.values(spline, times)
+    slack = 0.01 * quantities.scale
+    least, most = values.min(axis=1), values.max(axis=1)
+    room_below = np.where(np.isfinite(quantities.lower), least - quantities.lower, np.inf)
+    room_above = np.where(np.isfinite(quantities.upper), quantities.upper - most, np.inf)
+    sharp_below = least - np.minimum(SHARPNESS * room_below, np.maximum(SHARPNESS * np.abs(least), slack))
+    sharp_above = most + np.minimum(SHARPNESS * room_above, np.maximum(SHARPNESS * np.abs(most), slack))
+    return (
+        np.where(room_below < slack, quantities.lower, sharp_below),
+        np.where(room_above < slack, quantities.upper, sharp_above),
+    )

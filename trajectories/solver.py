@@ -1,0 +1,84 @@
+"""IPOPT on the program of a motion, and the motion that its answer stands for."""
+
+from __future__ import annotations
+
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .guess import Guess
+from .program import Program, Shape
+from .spline import Spline, clamped_knots, joined
+from .task import Task
+
+Array = NDArray[np.float64]
+
+_IPOPT = {
+    "print_level": 0, "sb": "yes", "tol": 1e-8, "acceptable_iter": 0, "max_iter": 500, "mu_strategy": "adaptive",
+    "honor_original_bounds": "yes",
+}  # fmt: skip
+
+
+
+def solver_of(program: Program, **options: Any) -> Any:
+    """IPOPT on a program; numbers in `options` replace the usual ones."""
+    import casadi as ca
+
+    functions = {name: f for name, f in program.problem.items() if name != "nlp"}
+    return ca.nlpsol(
+        "motion", "ipopt", program.problem["nlp"],
+        {**functions, "print_time": False, "error_on_fail": False, "no_nlp_grad": True,
+         "calc_lam_p": False, "ipopt": {**_IPOPT, **options}},
+    )  # fmt: skip
+
+
+def bounds(task: Task, program: Program, start: Guess) -> dict[str, Array]:
+    """Bounds of the variables: positions, what the waypoints give, durations."""
+    shape = program.shape
+    low, high = np.full(shape.size, -np.inf), np.full(shape.size, np.inf)
+    least, most = task.limits.room
+    for phase in range(shape.phases):
+        for k in range(shape.count):
+            places = shape.place(phase, np.arange(shape.controls), k)
+            low[places], high[places] = least[k], most[k]
+        at = shape.duration(phase)
+        low[at] = 0.02 * start.durations[phase] if not task.duration else 1e-3 * task.duration
+        high[at] = task.duration or task.longest
+    if task.duration and shape.phases == 1:
+        low[shape.duration(0)] = task.duration
+    low[shape.size - shape.slacks :] = 0.0
+    for places, values in _given(task, shape):
+        low[places] = high[places] = values
+    if shape.slacks and not task.duration:
+        low[[shape.duration(p) for p in range(shape.phases)]] = 1e-3 * task.longest
+    return {"lbx": low, "ubx": high}
+
+
+def _given(task: Task, shape: Shape) -> list[tuple[Any, float]]:
+    """Places of the variables that waypoints fix, and their values."""
+    fixed = []
+    for number, waypoint in enumerate(task.waypoints):
+        for k, value in enumerate(waypoint.known):
+            if np.isnan(value):
+                continue
+            if number < shape.phases:
+                still = task.rest if number == 0 else 1
+                fixed.append((shape.place(number, np.arange(still), k), float(value)))
+            if number > 0:
+                still = task.rest if number == shape.phases else 1
+                fixed.append((shape.place(number - 1, shape.controls - 1 - np.arange(still), k), float(value)))
+    return fixed
+
+
+def assembled(task: Task, shape: Shape, x: Array, begin: float) -> tuple[Spline, tuple[float, ...]]:
+    """The spline of a vector of variables, and the times at its waypoints."""
+    points, durations = shape.unpacked(x)
+    low, high = task.limits.room
+    clock, splines = begin, []
+    for own, duration in zip(points, durations, strict=True):
+        knots = clamped_knots(clock, clock + float(duration), task.spans, task.degree)
+        splines.append(Spline(knots=knots, coefficients=np.clip(own, low, high)))
+        clock = splines[-1].end
+    return reduce(joined, splines), tuple(s.end for s in splines)

@@ -1,0 +1,130 @@
+"""What a motion is to do: where it goes, what limits it, and what it costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .limits import MotionLimits
+from .quantity import Quantities
+from .spline import DEGREE
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Waypoint:
+    """A place that the motion passes.
+
+    Attributes:
+        value: What the coordinates, or what `through` makes of them, must be there. NaN leaves an entry free.
+            Shape (n,), or that of the output of `through`.
+        through: CasADi function of the coordinates, shape (n,), such as the place of a tool; None for the coordinates
+            themselves.
+        near: Coordinates from which the search starts where `value` does not give them all. Shape (n,).
+    """
+
+    value: Array
+    through: Any = None
+    near: Array | None = None
+
+    @property
+    def guess(self) -> Array:
+        """Coordinates to start from. Shape (n,)."""
+        value = np.asarray(self.value, dtype=float)
+        if self.through is None and self.near is not None:
+            return np.where(np.isnan(value), self.near, value)
+        return np.asarray(self.near if self.near is not None else value, dtype=float)
+
+    @property
+    def known(self) -> Array:
+        """The coordinates that are given, NaN elsewhere. Shape (n,)."""
+        return np.asarray(self.value, dtype=float) if self.through is None else np.full(len(self.guess), np.nan)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """A weighted sum of duration and integrals.
+
+    Attributes:
+        time: Weight of the duration, 1/s.
+        jerk: Weight of the integral of the sum of squared jerks.
+        running: CasADi function (x, x', x'', x''') -> column of running costs; None for none.
+        names: Names of the running costs, such as "energy".
+        weights: Their weights.
+    """
+
+    time: float = 1.0
+    jerk: float = 0.0
+    running: Any = None
+    names: tuple[str, ...] = ()
+    weights: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """A motion from rest to rest through waypoints.
+
+    Attributes:
+        waypoints: At least two; the motion rests at the first and the last.
+        limits: Limits of the coordinates and their derivatives.
+        quantities: What else is limited; None for nothing.
+        cost: What is minimised.
+        duration: Total duration, s; None to choose it.
+        longest: Longest admissible duration, s.
+        spans: Spans of the spline between two waypoints.
+        degree: Degree of the spline, 3 or more.
+        rest: 3 where position, speed and acceleration match rest at the ends, 2 for position and speed alone.
+    """
+
+    waypoints: tuple[Waypoint, ...]
+    limits: MotionLimits
+    quantities: Quantities | None = None
+    cost: Cost = Cost()
+    duration: float | None = None
+    longest: float = 60.0
+    spans: int = 24
+    degree: int = DEGREE
+    rest: int = 3
+
+    def __post_init__(self) -> None:
+        count = len(self.limits.names)
+        for rule, right, got in (
+            ("a motion needs two waypoints or more", len(self.waypoints) >= 2, len(self.waypoints)),
+            ("a spline needs degree 3 or more", self.degree >= 3, self.degree),
+            ("a motion needs spans", self.spans >= 2, self.spans),
+            ("rest is 2 or 3", self.rest in (2, 3), self.rest),
+            ("a motion needs a positive duration", self.longest > 0 and (self.duration or 1.0) > 0, self.duration),
+            (f"waypoints need {count} coordinates, or a place to start the search from",
+             all(w.guess.shape == (count,) and np.isfinite(w.guess).all() for w in self.waypoints),
+             [w.guess.tolist() for w in self.waypoints]),
+        ):  # fmt: skip
+            if not right:
+                raise ValueError(f"{rule}: got {got}")
+
+    @property
+    def phases(self) -> int:
+        """Number of moves between waypoints."""
+        return len(self.waypoints) - 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limit:
+    """A limit that a relaxation may widen.
+
+    Attributes:
+        name: What is limited, such as "lift speed".
+        unit: Its unit.
+        value: The limit.
+        scale: What a relaxation of 1 adds to it.
+        side: +1 for an upper limit, -1 for a lower one, 0 for a limit of the size.
+    """
+
+    name: str
+    unit: str
+    value: float
+    scale: float
+    side: int
