@@ -13,7 +13,7 @@ from .guess import Guess, guesses, straight
 from .limits import LimitViolatedError, violations
 from .program import POINTS, TIGHTENING, Program, build, gauss
 from .quantity import Peaks, peaks
-from .solver import assembled, bounds, solver_of
+from .solver import AGAIN, assembled, bounds, solver_of
 from .spline import Spline, clamped_knots
 from .task import Cost, Task
 
@@ -124,6 +124,7 @@ class _Attempt:
         x = program.shape.packed(list(self.start.points), self.start.durations)
         upper, lower = program.upper.copy(), program.lower.copy()
         known: dict[str, Any] = {}
+        again = None
         for rounds in range(1, ROUNDS + 1):
             answer = solver(x0=x, lbg=lower, ubg=upper, **bounds(task, program, self.start), **known)
             self.iterations += solver.stats()["iter_count"]
@@ -138,6 +139,7 @@ class _Attempt:
             self.failure = "limits between the collocation points"
             if found is not None:
                 _tighten(task, program, found, lower, upper)
+            solver = again = again or solver_of(program, **AGAIN)
             known = {"lam_x0": answer["lam_x"], "lam_g0": answer["lam_g"]}
         return None
 

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 #: A first guess takes this much longer than the quickest move by the limits of the coordinates.
 EASE = 1.5
+#: Share of the admissible time that the first guess takes where no coordinate has limits.
+UNKNOWN = 0.25
 #: Bends tried where straight lines fail, as shares of the room beside the line.
 BENDS = (0.0, 0.5, -0.5)
 
@@ -69,4 +71,4 @@ def _duration(task: Task, distance: Array) -> float:
     quickest = max(
         shortest_duration(float(d), *(float(v) for v in own)) for d, own in zip(distance, limits, strict=True)
     )
-    return max(EASE * quickest, 1e-3 * task.longest)
+    return max(EASE * quickest, 1e-3 * task.longest) if np.isfinite(limits).any() else UNKNOWN * task.longest

@@ -178,9 +178,7 @@ def _smooth(task: Task, shape: Shape, x: Any, scale: float, relaxed: bool) -> tu
         for p in range(shape.phases)
     ]
     maps = [ca.DM(ca.sparsify(ca.DM(m))) for m in derivative_matrices(task.spans, task.degree)]
-    rows: list[Any] = []
-    low: list[Array] = []
-    high: list[Array] = []
+    rows, low, high = [ca.SX.zeros(0, 1)], [np.zeros(0)], [np.zeros(0)]
 
     def add(row: Any, least: float, most: float) -> None:
         rows.append(row)

@@ -16,10 +16,17 @@ from .task import Task
 Array = NDArray[np.float64]
 
 _IPOPT = {
-    "print_level": 0, "sb": "yes", "tol": 1e-8, "acceptable_iter": 0, "max_iter": 500, "mu_strategy": "adaptive",
+    "print_level": 0, "sb": "yes", "tol": 1e-8, "acceptable_iter": 0, "max_iter": 200, "mu_strategy": "adaptive",
     "honor_original_bounds": "yes",
 }  # fmt: skip
 
+
+#: Further options where the search starts at the solution of nearly the same program.
+AGAIN = {
+    "warm_start_init_point": "yes", "mu_strategy": "monotone", "mu_init": 1e-6, "warm_start_bound_push": 1e-8,
+    "warm_start_mult_bound_push": 1e-8, "warm_start_slack_bound_push": 1e-8, "warm_start_bound_frac": 1e-8,
+    "warm_start_slack_bound_frac": 1e-8,
+}  # fmt: skip
 
 
 def solver_of(program: Program, **options: Any) -> Any:

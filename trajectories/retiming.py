@@ -1,0 +1,215 @@
+"""The quickest motion along a given path by TOPP-RA, checked again for all t after composition."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .guess import Guess
+from .limits import LimitViolatedError, MotionLimits
+from .path import Path, along
+from .quantity import Enclosure, Peaks, Quantities, peaks
+from .spline import Spline, clamped_knots, fitted
+from .task import Task
+
+Array = NDArray[np.float64]
+
+#: Grid points on the path.
+GRID = 400
+#: Retimings at the most, each inside tighter limits, until the composed motion is inside the given ones.
+ROUNDS = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Retimed:
+    """A motion along a path.
+
+    Attributes:
+        law: Path coordinate over time: s' is continuous, s'' piecewise constant, so jerk is not limited.
+        peaks: Bounds for all t of speeds, accelerations and quantities; all inside their limits.
+        quantities: What `peaks` bounds.
+        share: Share of the limits that was left to TOPP-RA so that the motion between its grid points is inside.
+    """
+
+    law: Spline
+    peaks: Peaks
+    quantities: Quantities
+    share: float
+
+    @property
+    def duration(self) -> float:
+        """Duration, s."""
+        return self.law.end - self.law.start
+
+
+def retime(
+    path: Path, limits: MotionLimits, enclose: Callable[[Any], Enclosure], quantities: Quantities | None = None, *,
+    grid: int = GRID,
+) -> Retimed:  # fmt: skip
+    """The quickest motion along a path inside limits on speed, acceleration and quantities such as torques.
+
+    Args:
+        path: The curve.
+        limits: Limits of speed and acceleration; jerk is left free.
+        enclose: Makes the bounds of a function on pieces of a motion.
+        quantities: Quantities that are affine in x'' and in products of speeds, such as joint torques and actuator
+            forces without friction; what is not is found in the check afterwards, not in the retiming.
+        grid: Number of intervals on the path.
+
+    Returns:
+        The motion, which is inside every limit for all t.
+
+    Raises:
+        LimitViolatedError: the path cannot be followed; the message says where it ends being controllable, and what
+            is outside its limit there at rest.
+
+    References:
+        H. Pham and Q.-C. Pham (2018), A new approach to time-optimal path parameterization based on reachability
+        analysis, IEEE Transactions on Robotics 34, 645-659.
+
+    Not guaranteed: TOPP-RA is optimal on its grid; between grid points s'' is constant.
+    """
+    free = MotionLimits(
+        position=limits.position, speed=limits.speed, acceleration=limits.acceleration, names=limits.names,
+        units=limits.units,
+    )  # fmt: skip
+    checked = along(path, free, quantities, enclose)
+    share = 1.0
+    for _ in range(ROUNDS):
+        law = _law(path, free, quantities, grid, share)
+        found = peaks(law, checked)
+        if found.inside:
+            return Retimed(law=law, peaks=found, quantities=checked, share=share)
+        share *= 1.0 - 1.1 * float((found.excess / checked.scale[:, None]).max()) - 1e-6
+    worst = int((found.excess.max(axis=1) / checked.scale).argmax())
+    raise LimitViolatedError(
+        f"{checked.names[worst]} stays outside its limit between the grid points of the path, by "
+        f"{found.excess[worst].max():.3g} {checked.units[worst]}; use more than {grid} intervals"
+    )
+
+
+def guess_of(retimed: Retimed, path: Path, task: Task, room: float = 1.02) -> Guess:
+    """Where the search for a motion of n coordinates may start: the path, run through as retimed.
+
+    Args:
+        retimed: The motion along the path.
+        path: The path.
+        task: A task of one phase from the start of the path to its end.
+        room: Factor on the duration.
+    """
+    return _sampled(task, path(retimed.law(_times(retimed, task))), room * retimed.duration)
+
+
+def law_guess(retimed: Retimed, task: Task, room: float = 1.02) -> Guess:
+    """The same for a task of the path coordinate, such as one with limited jerk."""
+    return _sampled(task, retimed.law(_times(retimed, task))[:, None], room * retimed.duration)
+
+
+def _times(retimed: Retimed, task: Task) -> Array:
+    return np.linspace(retimed.law.start, retimed.law.end, 8 * (task.spans + task.degree))
+
+
+def _sampled(task: Task, values: Array, duration: float) -> Guess:
+    unit = np.linspace(0.0, 1.0, len(values))
+    knots = clamped_knots(0.0, 1.0, task.spans, task.degree)
+    points = fitted(unit, values, knots, task.degree).coefficients
+    for end, own in ((slice(0, task.rest), values[0]), (slice(-task.rest, None), values[-1])):
+        points[end] = own
+    return Guess(points=(np.clip(points, *task.limits.room),), durations=np.array([duration]))
+
+
+def _law(path: Path, limits: MotionLimits, quantities: Quantities | None, grid: int, share: float) -> Spline:
+    """Path coordinate over time, within a share of the limits."""
+    import toppra
+    from toppra.algorithm import TOPPRA
+
+    logging.getLogger("toppra").setLevel(logging.ERROR)
+    points = np.linspace(0.0, 1.0, grid + 1)
+    algorithm = TOPPRA(
+        _constraints(toppra.constraint, limits, quantities, share), _curve(path, points), gridpoints=points,
+        solver_wrapper="seidel", parametrizer="ParametrizeConstAccel",
+    )  # fmt: skip
+    algorithm.compute_parameterization(0.0, 0.0)
+    rates = algorithm.problem_data.sd_vec
+    if rates is None or np.isnan(rates).any():
+        raise LimitViolatedError(_uncontrollable(algorithm, path, quantities, points))
+    return _quadratic(points, np.asarray(rates))
+
+
+def _quadratic(points: Array, rates: Array) -> Spline:
+    """The quadratic spline through grid points with given rates: s'' is constant between them."""
+    times = np.concatenate([[0.0], np.cumsum(2 * np.diff(points) / (rates[:-1] + rates[1:]))])
+    knots = np.concatenate([times[[0, 0]], times, times[[-1, -1]]])
+    inner = points[:-1] + rates[:-1] * np.diff(times) / 2
+    return Spline(knots=knots, coefficients=np.concatenate([points[:1], inner, points[-1:]]))
+
+
+def _constraints(constraint: Any, limits: MotionLimits, quantities: Quantities | None, share: float) -> list[Any]:
+    scheme = constraint.DiscretizationType.Interpolation
+    found = []
+    for kind, order in (("JointVelocityConstraint", 1), ("JointAccelerationConstraint", 2)):
+        size = np.minimum(share * limits.of(order), 1e6)
+        own = getattr(constraint, kind)(np.stack([-size, size], axis=1))
+        if order == 2:
+            own.set_discretization_type(scheme)
+        found.append(own)
+    if quantities is not None:
+        lower, upper = (share * ends for ends in (quantities.lower, quantities.upper))
+        above, below = (np.flatnonzero(np.isfinite(ends)) for ends in (upper, lower))
+        count = len(quantities.names)
+        factors = np.concatenate([np.eye(count)[above], -np.eye(count)[below]])
+        limit = np.concatenate([upper[above], -lower[below]])
+
+        def torque(q: Array, v: Array, a: Array) -> Array:
+            return np.array(quantities.function(q, v, a, np.zeros_like(q))).ravel()
+
+        own = constraint.SecondOrderConstraint(torque, lambda _: factors, lambda _: limit, len(limits.names))
+        own.set_discretization_type(scheme)
+        found.append(own)
+    return found
+
+
+def _curve(path: Path, points: Array) -> Any:
+    """The path in the form that toppra takes."""
+    from toppra.interpolator import AbstractGeometricPath
+
+    class Curve(AbstractGeometricPath):
+        dof = property(lambda _: path(points[:1]).shape[1])
+        path_interval = property(lambda _: np.array([0.0, 1.0]))
+        waypoints = property(lambda _: None)
+
+        def __call__(self, path_positions: Any, order: int = 0) -> Array:
+            values = path(path_positions, order)
+            return values if np.ndim(path_positions) else values[0]
+
+    return Curve()
+
+
+def _uncontrollable(algorithm: Any, path: Path, quantities: Quantities | None, points: Array) -> str:
+    """Where the path ends being controllable, and what is outside its limit there at rest."""
+    sets = algorithm.compute_controllable_sets(0.0, 0.0)
+    lost = np.flatnonzero(np.isnan(sets).any(axis=1))
+    at = float(points[lost[-1]]) if len(lost) else 0.0
+    message = f"the path cannot be followed inside the limits: no speed is left at {100 * at:.0f} % of it"
+    if quantities is None:
+        return message + "; raise the limits of acceleration there"
+    still = np.zeros(path(np.array([at])).shape[1])
+    shares = []
+    for s in (at, *points):
+        values = np.array(quantities.function(path([s])[0], still, still, still)).ravel()
+        outside = np.maximum(values - quantities.upper, quantities.lower - values) / quantities.scale
+        shares.append((float(outside.max()), int(outside.argmax()), s, values))
+        if shares[-1][0] > 0:
+            worst, value = shares[-1][1], shares[-1][3][shares[-1][1]]
+            name, unit = quantities.names[worst], quantities.units[worst]
+            limit = quantities.upper[worst] if value > quantities.upper[worst] else quantities.lower[worst]
+            return (
+                f"{message}; at rest at {100 * s:.0f} % of it {name} is {value:.5g} {unit}, its limit "
+                f"{limit:.5g} {unit}: move the path, or widen that limit"
+            )
+    return message + "; widen the limits of acceleration or of the quantities there"
