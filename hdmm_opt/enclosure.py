@@ -63,8 +63,9 @@ def _bound(here: Expression, rate: Expression, names: tuple[str, ...], pieces: P
     low, high = pieces.ranges(ORDERS)
     room = ROUNDING * np.maximum(np.abs(low), np.abs(high))
     middle, _ = _middle(pieces)
-    whole = enclose_many(here, _named(names, low, high))
-    point = enclose_many(here, _named(names, middle - room, middle + room))
+    # the whole piece and its middle in one evaluation
+    ends = (np.concatenate(both, axis=2) for both in ((low, middle - room), (high, middle + room)))
+    whole, point = zip(*(np.split(end, 2, axis=1) for end in enclose_many(here, _named(names, *ends))), strict=True)
     slope = np.maximum(*(np.abs(end) for end in enclose_many(rate, _named(names, low, high))))
     with np.errstate(invalid="ignore"):
         reach = np.nextafter(slope * np.nextafter(pieces.width / 2, np.inf), np.inf)

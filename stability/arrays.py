@@ -53,23 +53,24 @@ def _outwards(low: Any, high: Any, steps: int = 1) -> Pair:
 
 
 def _add(a: Pair, b: Pair) -> Pair:
-    return _whole(*_outwards(a[0] + b[0], a[1] + b[1]))
+    return _whole(a[0] + b[0], a[1] + b[1])
 
 
 def _sub(a: Pair, b: Pair) -> Pair:
-    return _whole(*_outwards(a[0] - b[1], a[1] - b[0]))
+    return _whole(a[0] - b[1], a[1] - b[0])
 
 
 def _mul(a: Pair, b: Pair) -> Pair:
     if b[0] is b[1] or a[0] is a[1]:  # a number
-        ends = (a[0] * b[0], a[1] * b[1])
+        first, second = a[0] * b[0], a[1] * b[1]
+        low, high = np.minimum(first, second), np.maximum(first, second)
     else:
-        ends = (a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1])
-    if any(np.isnan(end).any() for end in ends):  # 0 times infinity: the member 0 makes it 0
-        ends = tuple(np.where(np.isnan(a[i] * b[j]), 0.0, a[i] * b[j]) for i in (0, 1) for j in (0, 1))
-    low, high = ends[0], ends[0]
-    for end in ends[1:]:
-        low, high = np.minimum(low, end), np.maximum(high, end)
+        first, second, third, fourth = a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]
+        low = np.minimum(np.minimum(first, second), np.minimum(third, fourth))
+        high = np.maximum(np.maximum(first, second), np.maximum(third, fourth))
+    if np.isnan(low).any():  # 0 times infinity: the member 0 makes it 0
+        ends = [np.nan_to_num(x * y, nan=0.0, posinf=np.inf, neginf=-np.inf) for x in a for y in b]
+        low, high = np.minimum.reduce(ends), np.maximum.reduce(ends)
     return _outwards(low, high)
 
 
@@ -133,8 +134,10 @@ def _passes(a: Pair, phase: float) -> Any:
 
 
 def _whole(low: Any, high: Any) -> Pair:
-    """Ends that cannot be told, ∞ - ∞, become infinite."""
-    return np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)
+    """Rounded outwards; ends that cannot be told, ∞ - ∞, become infinite."""
+    if np.isnan(low).any() or np.isnan(high).any():
+        low, high = np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)
+    return _outwards(low, high)
 
 
 _OPERATORS: dict[str, Callable[..., Pair]] = {

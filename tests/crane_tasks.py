@@ -37,7 +37,9 @@ def random_task(seed):
         ends = [np.array(tool_function()(w)).ravel() for w in (start, goal)]
         middle = np.array(tool_function()((start + goal) / 2)).ravel() + random.normal(0, 0.2, 2)
         radius = min(0.35, 0.7 * min(np.hypot(*(middle - end)) for end in ends))
-        return crane_task([start, goal], obstacles=[Ball(name="post", centre=tuple(middle), radius=radius), GROUND], **given)
+        return crane_task(
+            [start, goal], obstacles=[Ball(name="post", centre=tuple(middle), radius=radius), GROUND], **given
+        )
     if kind == "cost":
         return crane_task([start, goal], cost=crane_cost(time=1.0, effort=0.5, payload=payload), **given)
     return crane_task([start, goal], **given)
@@ -54,7 +56,10 @@ def excess(task, motion, points=4001):
     shares.append(max((low - where).max(), (where - high).max()))
     q = task.quantities
     values = q.values(motion.spline, times)
-    shares.append(max(((values - q.upper[:, None]) / q.scale[:, None]).max(), ((q.lower[:, None] - values) / q.scale[:, None]).max()))
+    shares.append(
+        max(
+            ((values - q.upper[:, None]) / q.scale[:, None]).max(),
+            ((q.lower[:, None] - values) / q.scale[:, None]).max(),
+        )
+    )
     return max(shares)
-
-

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +30,8 @@ class Pieces:
     start: Array
     width: Array
 
-    def chosen(self, mask: Array) -> Pieces:
-        """Some of the pieces."""
+    def chosen(self, mask: Any) -> Pieces:
+        """Some of the pieces, by a mask or a slice."""
         return Pieces(points=self.points[mask], start=self.start[mask], width=self.width[mask])
 
     def halved(self) -> Pieces:

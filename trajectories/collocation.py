@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from .diagnosis import at_rest, refusal, relaxed
 from .guess import Guess, guesses, straight
 from .limits import LimitViolatedError, violations
-from .program import POINTS, TIGHTENING, Program, build, gauss
+from .nodes import POINTS, TIGHTENING, gauss
+from .program import Program, build
 from .quantity import Peaks, peaks
 from .solver import AGAIN, assembled, bounds, solver_of
 from .spline import Spline, clamped_knots
@@ -25,6 +26,7 @@ ROUNDS = 8
 FORWARD = 1.2
 #: A motion longer than this, s, is not searched for.
 LONGEST = 1e4
+
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:

@@ -62,7 +62,7 @@ def bezier(points: ArrayLike) -> Path:
 
 
 def composed(path: Path, curves: list[Any]) -> list[Any]:
-    """Position … jerk along a path from those of the path coordinate (Faà di Bruno): r' s''' + 3 r'' s' s'' + …"""
+    """Position … jerk along a path from those of the path coordinate (the chain rule)."""
     r, r1, r2, r3 = path.derivatives()(curves[0])
     _, ds, dds, ddds = curves
     return [r, r1 * ds, r2 * ds**2 + r1 * dds, r3 * ds**3 + 3 * r2 * ds * dds + r1 * ddds]

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 #: arithmetic behind it is; infinite where it cannot tell.
 Enclosure = Callable[[Pieces], tuple[Array, Array]]
 
-#: How often a piece may be halved while a quantity is not yet shown to be inside its limits.
-DEPTH = 12
+#: How often pieces may be cut while a quantity is not yet shown to be inside its limits, and halvings in each cut.
+CUTS, HALVINGS = 4, 3
 #: A bound is sharpened until it takes no more than this share of the room that samples show.
 SHARPNESS = 0.1
 
@@ -51,8 +51,8 @@ class Quantities:
 
     def values(self, spline: Spline, times: Array) -> Array:
         """The quantities at given times. Shape (q, len(times))."""
-        curves = [np.atleast_2d(spline(times, order).T) if spline.degree >= order else 0.0 for order in range(4)]
-        curves = [np.broadcast_to(curve, curves[0].shape) for curve in curves]
+        known = [np.atleast_2d(spline(times, order).T) for order in range(min(4, spline.degree + 1))]
+        curves = known + [np.zeros_like(known[0])] * (4 - len(known))
         return np.array(self.function.map(len(times))(*curves))
 
 
@@ -88,29 +88,31 @@ class Peaks:
 
 
 def peaks(spline: Spline, quantities: Quantities) -> Peaks:
-    """Bounds of the quantities for all t: pieces are halved until the limits are shown, `DEPTH` times at the most.
+    """Bounds of the quantities for all t: pieces are cut until the limits are shown, `CUTS` times at the most.
 
     Args:
         spline: The motion.
         quantities: What to bound, and the limits.
 
     Returns:
-        The bounds; outside a limit only where halving could not bring them inside.
+        The bounds; outside a limit only where cutting could not bring them inside.
     """
     work = pieces(spline)
     span, spans = np.arange(len(work.start)), len(work.start)
     least, most = _targets(spline, work, quantities)
     low, high = np.full((len(quantities.names), spans), np.inf), np.full((len(quantities.names), spans), -np.inf)
-    for depth in range(DEPTH + 1):
+    for cuts in range(CUTS + 1):
         under, over = quantities.enclose(work)
         below = (under < least[:, None]) & (over >= quantities.lower[:, None])  # and not outside all the way
         above = (over > most[:, None]) & (under <= quantities.upper[:, None])
-        coarse = (below | above).any(axis=0) & (depth < DEPTH)
+        coarse = (below | above).any(axis=0) & (cuts < CUTS)
         for rows, bound, keep in ((low, under, np.minimum), (high, over, np.maximum)):
-            keep.at(rows, (slice(None), span[~coarse]), bound[:, ~coarse])
+            keep.at(rows.T, span[~coarse], bound[:, ~coarse].T)
         if not coarse.any():
             break
-        work, span = work.chosen(coarse).halved(), np.tile(span[coarse], 2)
+        work, span = work.chosen(coarse), span[coarse]
+        for _ in range(HALVINGS):
+            work, span = work.halved(), np.tile(span, 2)
     outside = np.maximum(high - quantities.upper[:, None], quantities.lower[:, None] - low)
     return Peaks(
         lower=low.min(axis=1),

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .guess import Guess
-from .program import Program, Shape
+from .program import Program
+from .shape import Shape
 from .spline import Spline, clamped_knots, joined
 from .task import Task
 

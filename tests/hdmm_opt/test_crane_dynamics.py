@@ -15,7 +15,10 @@ from hdmm_opt.plants.pmsm_emla import POLE_PAIRS, defaults, pmsm_emla
 from hdmm_opt.plants.rigid_body import GRAVITY
 
 URDF = (Path(hdmm_opt.plants.__file__).parent / "crane.urdf").read_text(encoding="utf-8")
-LOW, HIGH = np.array([LIFT.usable(0.1)[0], TILT.usable(0.1)[0], 0.0]), np.array([LIFT.usable(0.1)[1], TILT.usable(0.1)[1], TELESCOPE])
+LOW, HIGH = (
+    np.array([LIFT.usable(0.1)[0], TILT.usable(0.1)[0], 0.0]),
+    np.array([LIFT.usable(0.1)[1], TILT.usable(0.1)[1], TELESCOPE]),
+)
 
 
 def compiled(expression):
@@ -65,14 +68,20 @@ class Closed:
         self.model = pinocchio.buildModelFromXML(URDF)
         self.model.gravity.linear = np.array(GRAVITY)
         telescope = self.model.getJointId("telescope")
-        self.model.appendBodyToJoint(telescope, pinocchio.Inertia(payload, np.zeros(3), np.zeros((3, 3))), pinocchio.SE3.Identity())
+        self.model.appendBodyToJoint(
+            telescope, pinocchio.Inertia(payload, np.zeros(3), np.zeros((3, 3))), pinocchio.SE3.Identity()
+        )
         self.data = self.model.createData()
         constraints = []
         for loop in (LIFT, TILT):
             rod, link = (self.model.getJointId(name) for name in (f"{loop.name}_rod", loop.name))
             tip = pinocchio.SE3(np.eye(3), np.array([loop.dead, 0.0, 0.0]))
             place = pinocchio.SE3(np.eye(3), in_space(ends(loop)[2]))
-            constraints.append(pinocchio.RigidConstraintModel(pinocchio.ContactType.CONTACT_3D, self.model, rod, tip, link, place, pinocchio.ReferenceFrame.LOCAL))
+            constraints.append(
+                pinocchio.RigidConstraintModel(
+                    pinocchio.ContactType.CONTACT_3D, self.model, rod, tip, link, place, pinocchio.ReferenceFrame.LOCAL
+                )
+            )
         self.constraints, self.stored = pinocchio.StdVec_RigidConstraintModel(), pinocchio.StdVec_RigidConstraintData()
         for constraint in constraints:
             self.constraints.append(constraint)
@@ -107,7 +116,9 @@ class Closed:
             effort[self.column(name)] -= DAMPING * v[k]
         pinocchio.initConstraintDynamics(self.model, self.data, self.constraints, self.stored)
         settings = pinocchio.ProximalSettings(1e-14, 1e-10, 100)
-        found = pinocchio.constraintDynamics(self.model, self.data, q, rate, effort, self.constraints, self.stored, settings)
+        found = pinocchio.constraintDynamics(
+            self.model, self.data, q, rate, effort, self.constraints, self.stored, settings
+        )
         return found[[self.column(name) for name in ("lift", "tilt", "telescope")]]
 
 
@@ -134,7 +145,9 @@ def mujoco_model(payload):
     telescope = f'<body pos="1.99949 0 0.154167"><joint name="telescope" type="slide" axis="1 0 0"/>{inertial(570.19, (0.2547, -0.1303), 67.38)}{loose(6.73, (0.622 - 1.99949, 0.0), 0.918)}{loose(payload, (0, 0), 1e-9)}</body>'
     tilt = f'<body name="tilt_link" pos="{ELBOW[0]} 0 {ELBOW[1]}"><joint name="tilt" axis="0 -1 0"/>{inertial(33.93, (0.605, 0.272), 7.409)}{loose(9.26, (0.622, 0.154167), 1.484)}{telescope}</body>'
     lift = f'<body name="lift_link" pos="{BASE[0]} 0 {BASE[1]}"><joint name="lift" axis="0 -1 0"/>{inertial(25.53, (0.238, 0.132), 0.679)}{loose(54.59, (0.543, 0.105), 5.973)}{tilt}{actuator(TILT)}</body>'
-    closed = "".join(f'<connect body1="{loop.name}_rod" body2="{loop.name}_link" anchor="{loop.dead} 0 0"/>' for loop in (LIFT, TILT))
+    closed = "".join(
+        f'<connect body1="{loop.name}_rod" body2="{loop.name}_link" anchor="{loop.dead} 0 0"/>' for loop in (LIFT, TILT)
+    )
     return mujoco.MjModel.from_xml_string(
         f'<mujoco><compiler inertiafromgeom="false" autolimits="false"/><option gravity="0 0 {GRAVITY[2]}"/><worldbody>{lift}{actuator(LIFT)}</worldbody><equality>{closed}</equality></mujoco>'
     )
@@ -145,7 +158,10 @@ def test_the_mass_matrix_is_that_of_mujocos_tree_on_the_closed_loops():
     payload = 120.0
     model = mujoco_model(payload)
     data = mujoco.MjData(model)
-    order = {name: model.jnt_dofadr[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)] for name in ("lift", "tilt", "telescope", "lift_cylinder", "lift_rod", "tilt_cylinder", "tilt_rod")}
+    order = {
+        name: model.jnt_dofadr[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)]
+        for name in ("lift", "tilt", "telescope", "lift_cylinder", "lift_rod", "tilt_cylinder", "tilt_rod")
+    }
     for w, *_ in cases(10, seed=3):
         slope = np.zeros((model.nv, 3))
         q = np.zeros(model.nq)
@@ -153,7 +169,11 @@ def test_the_mass_matrix_is_that_of_mujocos_tree_on_the_closed_loops():
             q[order[name]], slope[order[name], k] = w[k], 1.0
         for k, loop in enumerate((LIFT, TILT)):
             step = 1e-6
-            (angle, length), later, earlier = closing(loop, w[k]), closing(loop, w[k] + step), closing(loop, w[k] - step)
+            (angle, length), later, earlier = (
+                closing(loop, w[k]),
+                closing(loop, w[k] + step),
+                closing(loop, w[k] - step),
+            )
             q[order[f"{loop.name}_cylinder"]], q[order[f"{loop.name}_rod"]] = angle, length - loop.dead
             turned = np.unwrap([earlier[0], later[0]])
             slope[order[f"{loop.name}_cylinder"], k] = (turned[1] - turned[0]) / (2 * step)
@@ -205,7 +225,10 @@ def test_levers_are_the_slopes_of_the_strokes():
 
 def test_the_drives_agree_with_the_actuators_own_model():
     """Torque and voltage hold the EMLA plant still at the same acceleration: h_2 = M_2 x'', h_3 = L i', h_4 = 0."""
-    plant = pmsm_emla("voltage", {**defaults("voltage"), "load_mass": defaults("voltage")["load_mass"].__class__(value=1e-9, unit="kg")})
+    plant = pmsm_emla(
+        "voltage",
+        {**defaults("voltage"), "load_mass": defaults("voltage")["load_mass"].__class__(value=1e-9, unit="kg")},
+    )
     rows = ca.Function("rows", [plant.x, plant.u, plant.w, plant.p], [plant.mass, plant.force])
     w, v, a, j = (ca.SX.sym(name, 3) for name in "wvaj")
     found = drives(w, v, a, j)
@@ -214,7 +237,9 @@ def test_the_drives_agree_with_the_actuators_own_model():
     known = {name: p.value for name, p in plant.parameters.items()}
     for case, rate, gain, _ in cases(10, seed=8):
         force, speed, current, voltage, torque = (np.array(x).ravel() for x in ask(case, rate, gain, np.zeros(3)))
-        second = np.array(ca.Function("g", [w, v, a], [levers(w) * a + ca.jtimes(levers(w), w, v) * v])(case, rate, gain)).ravel()
+        second = np.array(
+            ca.Function("g", [w, v, a], [levers(w) * a + ca.jtimes(levers(w), w, v) * v])(case, rate, gain)
+        ).ravel()
         for i in range(3):
             rod = speed[i] * known["transmission"]
             mass, push = (np.array(x).ravel() for x in rows([0.3, rod, current[i], 0.0], [0, 0], [force[i]], values))
@@ -234,7 +259,12 @@ def test_the_voltage_moves_the_current_along_the_motion():
     def at(t):
         phase = np.array([0.7, 1.1, 0.9]) * t
         rates = np.array([0.7, 1.1, 0.9])
-        motion = (centre + amplitude * np.sin(phase), amplitude * rates * np.cos(phase), -amplitude * rates**2 * np.sin(phase), -amplitude * rates**3 * np.cos(phase))
+        motion = (
+            centre + amplitude * np.sin(phase),
+            amplitude * rates * np.cos(phase),
+            -amplitude * rates**2 * np.sin(phase),
+            -amplitude * rates**3 * np.cos(phase),
+        )
         return [np.array(x).ravel() for x in ask(*motion)]
 
     for t in (0.3, 1.7, 2.9):

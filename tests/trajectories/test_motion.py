@@ -1,0 +1,211 @@
+"""Motions of several coordinates: derivatives of the program, waypoints, tools, obstacles."""
+
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from trajectories import (
+    Ball,
+    Cost,
+    HalfSpace,
+    LimitViolatedError,
+    MotionLimits,
+    Quantities,
+    Task,
+    Waypoint,
+    jerk_limited,
+    solve,
+    violations,
+)
+from trajectories.guess import straight
+from trajectories.program import build
+
+LIMITS = MotionLimits(
+    position=([-2.0, -2.0, 0.0], [2.0, 2.0, 1.0]), speed=[0.5, 0.6, 0.3], acceleration=[1.0, 1.0, 0.8], jerk=[8.0, 8.0, 6.0],
+    names=("a", "b", "c"), units=("rad", "rad", "m"),
+)  # fmt: skip
+
+
+def at(*values):
+    return Waypoint(value=np.array(values, dtype=float))
+
+
+def tool():
+    w = ca.SX.sym("w", 3)
+    reach = 1.5 + w[2]
+    return ca.Function(
+        "tool",
+        [w],
+        [ca.vertcat(ca.cos(w[0]) + reach * ca.cos(w[0] + w[1]), ca.sin(w[0]) + reach * ca.sin(w[0] + w[1]))],
+    )
+
+
+def wide(low, high):
+    """Bounds that hold for whatever takes part: for tests that look at something else."""
+    return lambda found: (np.full((1, len(found.start)), low), np.full((1, len(found.start)), high))
+
+
+def nonlinear():
+    """A quantity and a cost in which everything is coupled."""
+    x, v, a, j = curves = [ca.SX.sym(n, 3) for n in "xvaj"]
+    value = ca.sin(x[0]) * a[1] + v[0] * v[2] * ca.cos(x[1]) + 0.1 * j[2] * x[2]
+    return (
+        Quantities(function=ca.Function("q", curves, [ca.vertcat(value, a[0] + x[1] ** 2)]), names=("p", "q"), units=("1", "1"), lower=np.array([-0.7, -np.inf]), upper=np.array([0.9, 3.0]), enclose=wide(0, 0)),
+        Cost(time=1.0, jerk=1e-3, running=ca.Function("r", curves, [ca.vertcat(ca.sumsqr(a), v[0] ** 2 * x[2])]), names=("e", "f"), weights=(0.3, 0.2)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("relaxed", [False, True])
+@pytest.mark.parametrize("places", [2, 3])
+def test_derivatives_of_the_program_are_those_of_its_functions(relaxed, places):
+    """By hand and sparse, against CasADi's differentiation of the cost and the rows."""
+    quantities, cost = nonlinear()
+    middle = Waypoint(value=np.array([1.5, 1.0]), through=tool(), near=np.array([0.5, 0.2, 0.4]))
+    task = Task(
+        waypoints=(at(0, 0, 0), middle, at(1, 0.5, 0.8))[3 - places if places == 2 else 0 :]
+        if places == 3
+        else (at(0, 0, 0), at(1, 0.5, 0.8)),
+        limits=LIMITS,
+        quantities=quantities,
+        cost=cost,
+        spans=6,
+    )
+    program = build(task, 0.7, relaxed=relaxed)
+    x, f, g = (program.problem["nlp"][name] for name in "xfg")
+    random = np.random.default_rng(1)
+    guess = straight(task)
+    point = program.shape.packed([p + random.normal(0, 0.05, p.shape) for p in guess.points], guess.durations)
+    point[program.shape.size - program.shape.slacks :] = random.uniform(0, 1, program.shape.slacks)
+    weight = random.normal(size=g.numel())
+    empty = np.zeros(0)
+    symbol = ca.MX.sym("l", g.numel())
+    gradient = ca.Function("d", [x], [ca.gradient(f, x)])
+    jacobian = ca.Function("j", [x], [ca.jacobian(g, x)])
+    hessian = ca.Function("h", [x, symbol], [ca.triu(ca.hessian(0.4 * f + ca.dot(symbol, g), x)[0])])
+    dense = {
+        "grad_f": (np.array(program.problem["grad_f"](point, empty)[1]), np.array(gradient(point))),
+        "jac_g": (
+            np.array(ca.densify(program.problem["jac_g"](point, empty)[1])),
+            np.array(ca.densify(jacobian(point))),
+        ),
+        "hess_lag": (
+            np.array(ca.densify(program.problem["hess_lag"](point, empty, 0.4, weight))),
+            np.array(ca.densify(hessian(point, weight))),
+        ),
+    }
+    for own, oracle in dense.values():
+        assert np.abs(oracle).max() > 0
+        assert own == pytest.approx(oracle, rel=1e-9, abs=1e-9 * np.abs(oracle).max())
+
+
+def test_the_slowest_coordinate_sets_the_time():
+    """With jerk nearly free, the time is the largest d/v + v/a."""
+    limits = MotionLimits(**{**vars(LIMITS), "jerk": [1e3] * 3})
+    motion = solve(Task(waypoints=(at(0, 0, 0), at(1.0, 0.5, 0.9)), limits=limits, spans=60))
+    exact = 0.9 / 0.3 + 0.3 / 0.8
+    assert exact * (1 - 1e-9) <= motion.cost <= 1.01 * exact
+    assert not violations(motion.spline, limits)
+
+
+def test_it_passes_every_waypoint_and_is_smooth_there():
+    places = [(0, 0, 0), (1.0, 0.5, 0.8), (1.5, 1.0, 0.2), (0, 0, 0.5)]
+    motion = solve(Task(waypoints=tuple(at(*p) for p in places), limits=LIMITS))
+    times = (0.0, *motion.arrivals)
+    for t, place in zip(times, places, strict=True):
+        assert motion.spline([t])[0] == pytest.approx(place, abs=1e-7)
+    for t in motion.arrivals[:-1]:
+        for order in range(3):
+            before, after = motion.spline([t - 1e-9, t + 1e-9], order)
+            assert before == pytest.approx(after, abs=1e-6)
+        assert np.abs(motion.spline([t], 1)).max() > 0.05  # it does not stop
+    for t in (0.0, motion.arrivals[-1]):
+        assert np.abs(motion.spline([t], 1)).max() < 1e-9 and np.abs(motion.spline([t], 2)).max() < 1e-7
+    assert not violations(motion.spline, LIMITS)
+    stops = sum(solve(Task(waypoints=(at(*a), at(*b)), limits=LIMITS)).cost for a, b in pairwise(places))
+    assert motion.cost < stops
+
+
+def test_a_tool_reaches_its_goal_with_the_joints_it_likes():
+    goal = np.array([0.4, 2.0])
+    through = Waypoint(value=goal, through=tool(), near=np.array([1.0, 0.5, 0.3]))
+    motion = solve(Task(waypoints=(at(0, 0, 0), through), limits=LIMITS))
+    assert np.array(tool()(motion.spline.coefficients[-1])).ravel() == pytest.approx(goal, abs=1e-7)
+    assert not violations(motion.spline, LIMITS)
+    fixed = solve(Task(waypoints=(at(0, 0, 0), at(*motion.spline.coefficients[-1] + [0.0, 0.0, 1e-9])), limits=LIMITS))
+    assert motion.cost <= fixed.cost * (1 + 1e-4)
+
+
+def test_a_free_coordinate_is_chosen():
+    motion = solve(
+        Task(
+            waypoints=(at(0, 0, 0), Waypoint(value=np.array([1.0, np.nan, 0.1]), near=np.array([0, 1.5, 0]))),
+            limits=LIMITS,
+        )
+    )
+    alone = solve(Task(waypoints=(at(0, 0, 0), at(1.0, 0.0, 0.1)), limits=LIMITS))
+    assert motion.cost == pytest.approx(alone.cost, rel=1e-5)
+    assert np.abs(motion.spline([motion.spline.end], 1)).max() < 1e-9
+
+
+def around(obstacle):
+    """Clearance of a point (x0, x1), with bounds from the ranges of its coordinates."""
+    x, v, a, j = (ca.SX.sym(n, 3) for n in "xvaj")
+
+    def enclose(found):
+        low, high = found.ranges(1)
+        low, high = low[0], high[0]
+        centre = np.array(obstacle.centre)[:, None]
+        far = np.maximum(np.abs(low[:2] - centre), np.abs(high[:2] - centre))
+        near = np.maximum(0.0, np.maximum(low[:2] - centre, centre - high[:2]))
+        return tuple(((part**2).sum(axis=0) - obstacle.radius**2)[None] / (2 * obstacle.radius) for part in (near, far))
+
+    return Quantities(function=ca.Function("clear", [x, v, a, j], [obstacle.clearance(x)]), names=("clearance",), units=("m",), lower=np.zeros(1), upper=np.array([np.inf]), enclose=enclose)  # fmt: skip
+
+
+def test_it_goes_round_an_obstacle_for_all_t():
+    post = Ball(name="post", centre=(0.5, 0.05), radius=0.3)
+    motion = solve(Task(waypoints=(at(0, 0, 0), at(1.0, 0.1, 0.3)), limits=LIMITS, quantities=around(post)))
+    free = solve(Task(waypoints=(at(0, 0, 0), at(1.0, 0.1, 0.3)), limits=LIMITS))
+
+    def nearest(found):
+        return np.hypot(*(found.spline(np.linspace(0, found.spline.end, 20_001))[:, :2] - post.centre).T).min()
+
+    assert nearest(free) < 0.1 < post.radius <= nearest(motion) and motion.peaks.lower[0] >= 0.0
+    assert free.cost <= motion.cost * (1 + 1e-6)
+
+
+def test_a_goal_inside_an_obstacle_is_refused():
+    post = Ball(name="post", centre=(1.0, 0.1), radius=0.3)
+    with pytest.raises(LimitViolatedError, match=r"at rest at the goal, clearance is -0\.15 m"):
+        solve(Task(waypoints=(at(0, 0, 0), at(1.0, 0.1, 0.3)), limits=LIMITS, quantities=around(post)))
+    with pytest.raises(ValueError, match="positive radius"):
+        Ball(name="post", centre=(0.0, 0.0), radius=0.0)
+
+
+@given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.1, 2), st.floats(0, 6.2))
+def test_clearance_is_distance_at_the_surface(x, y, radius, angle):
+    ball = Ball(name="b", centre=(x, y), radius=radius)
+    near = (x + (radius + 1e-6) * np.cos(angle), y + (radius + 1e-6) * np.sin(angle))
+    assert ball.clearance(near) == pytest.approx(1e-6, rel=1e-3)
+    assert ball.clearance((x, y)) < 0
+    wall = HalfSpace(name="w", normal=(np.cos(angle), np.sin(angle)), offset=radius)
+    assert wall.clearance((x, y)) == pytest.approx(radius - x * np.cos(angle) - y * np.sin(angle))
+
+
+@settings(max_examples=15)
+@given(st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6))
+def test_never_faster_than_the_jerk_limited_optimum_of_the_coordinates(values):
+    """Ruckig's time is the exact optimum without efforts; control points cost little."""
+    start, goal = np.array(values[:3]), np.array(values[3:])
+    limits = MotionLimits(**{**vars(LIMITS), "position": (-2.0, 2.0)})
+    if np.abs(goal - start).max() < 1e-3:
+        return
+    best = jerk_limited(start, goal, limits)
+    assert violations(best, limits) == [] and best([best.end])[0] == pytest.approx(goal)
+    if np.abs(goal - start).max() > 0.05:
+        motion = solve(Task(waypoints=(at(*start), at(*goal)), limits=limits, spans=40))
+        assert best.end * (1 - 1e-6) <= motion.cost <= 1.06 * best.end
