@@ -54,16 +54,10 @@ def main() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def studies(as_json: bool) -> None:
     """List the bundled studies: name, machine, law, what it shows."""
-    from .study import bundled, load
+    from .commands import study_row
+    from .study import bundled
 
-    rows = []
-    for name in bundled():
-        study = load(name)
-        law = study.controller.law + (" model-based" if study.controller.modelling else " model-free")
-        rows.append({
-            "name": name, "machine": f"{study.plant.model} ({study.plant.level})",
-            "law": f"{law}, {study.controller.rate_hz:g} Hz", "shows": study.study.summary,
-        })  # fmt: skip
+    rows = [study_row(name) for name in bundled()]
     if as_json:
         click.echo(json.dumps(rows, indent=1))
         return

@@ -274,13 +274,27 @@ def run_tradeoff(name: str, output: Path | None, options: Options) -> int:
     return PROVED if table else NOT_PROVED
 
 
+def study_row(name: str) -> dict[str, str]:
+    """What `hdmm-opt studies` says of a bundled study."""
+    chosen = study.load_any(name)
+    if not isinstance(chosen, study.Study):
+        machine, law = chosen.plant.model, f"no law: {chosen.reference.kind} motion"
+    else:
+        machine = f"{chosen.plant.model} ({chosen.plant.level})"
+        kind = " model-based" if chosen.controller.modelling else " model-free"
+        law = f"{chosen.controller.law}{kind}, {chosen.controller.rate_hz:g} Hz"
+    return {"name": name, "machine": machine, "law": law, "shows": chosen.study.summary}
+
+
 def run_trajectory(name: str, output: Path | None) -> int:
     """`hdmm-opt trajectory`."""
     from .motion import effort_table
 
-    chosen = study.load(name)
+    chosen = study.load_any(name)
     if output is not None:
         check_writable(output)
+    if not isinstance(chosen, study.Study):
+        return _run_motion(chosen, output)
     problem = assemble(chosen)
     moves = sum(1 for s in problem.reference.segments if s.coefficients.min() < s.coefficients.max())
     click.echo(f"{chosen.study.name}: {moves} moves ({chosen.reference.kind}), {problem.reference.duration:.4g} s")
@@ -289,5 +303,39 @@ def run_trajectory(name: str, output: Path | None) -> int:
         click.echo(f"  {row['quantity']:13} {row['peak']:10.4g} {row['unit']:6} {limit}")
     if output is not None:
         write_text(output, gain_file.to_text(gain_file.reference_data(problem.reference)))
+        click.echo(str(output))
+    return PROVED
+
+
+def _run_motion(chosen: Any, output: Path | None) -> int:
+    """The motions of a study without a controller."""
+    from trajectories import LimitViolatedError
+
+    from .bilevel import bilevel
+    from .crane_task import ASSUMED
+    from .motion_file import document
+
+    with bar() as progress:
+        progress.stage(chosen.study.name)
+        try:
+            found = bilevel(
+                chosen.job(), chosen.reference.evaluations,
+                lambda done, of, best: progress.update(done / of, f"lost {best:.4g} J"),
+            )  # fmt: skip
+        except LimitViolatedError as error:
+            raise InvalidInputError(f"{chosen.study.name}: {error}") from None
+    click.echo(
+        f"{'motion':20} {'time [s]':>9} {'energy [J]':>11} {'lost [J]':>9} {'effort [s]':>10} {'efficiency':>10}"
+    )
+    for motions in found.references:
+        total = motions.totals
+        click.echo(
+            f"{motions.name:20} {motions.duration:9.4g} {total['energy']:11.5g} {total['loss']:9.5g} "
+            f"{total['effort']:10.3g} {motions.efficiency:10.3f}"
+        )
+    click.echo(f"{found.evaluations} decisions of the leader; every motion is inside its limits for all t", err=True)
+    click.echo(f"assumed, to be replaced by yours: {', '.join(ASSUMED)}", err=True)
+    if output is not None:
+        write_text(output, gain_file.to_text(document(chosen, found)))
         click.echo(str(output))
     return PROVED

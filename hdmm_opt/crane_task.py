@@ -16,12 +16,19 @@ from .enclosure import enclosure
 from .errors import InvalidInputError
 from .plants.crane import LIFT, TELESCOPE, TILT, tool
 from .plants.crane_dynamics import JOINTS, LIMITS, drives
+from .plants.pmsm_emla import defaults
 
 #: Shortest lever arm of the actuators of lift and tilt that a motion may use, m/rad; assumed.
 LEAST_LEVER = 0.08
 #: Largest rates, accelerations and jerks of lift, tilt (rad) and telescope (m); assumed.
 SPEED, ACCELERATION, JERK = (0.5, 0.6, 0.13), (0.8, 0.8, 0.5), (8.0, 8.0, 5.0)
 UNITS = ("rad", "rad", "m")
+#: What a motion of the crane rests on that has no public source.
+ASSUMED = (
+    "least lever arm", "limits of joint rates, accelerations and jerks", "mounting of the actuators",
+    "frames of the telescope's parts and of the end mass",
+    *(name.replace("_", " ") for name, p in defaults("voltage").items() if p.source == "assumed" and name != "load_mass"),
+)  # fmt: skip
 
 
 def joint_limits(least_lever: float = LEAST_LEVER) -> MotionLimits:
@@ -68,7 +75,7 @@ def drive_quantities(payload: float = 0.0, obstacles: tuple[Obstacle, ...] = ())
 
 @lru_cache(maxsize=8)
 def running_costs(payload: float = 0.0) -> ca.Function:
-    """Electrical power drawn, W, copper loss, W, and effort, the sum of squared shares of the torque limits."""
+    """Electrical power drawn, W, what is lost of it, W, and effort, the sum of squared shares of the torque limits."""
     w, v, a, j = symbols = [ca.SX.sym(name, 3) for name in "wvaj"]
     found = drives(w, v, a, j, payload)
     effort = ca.sumsqr(found.torque / dict((name, limit) for name, _, limit in LIMITS)["motor torque"])

@@ -73,7 +73,7 @@ def _move(study: Study, plant: Plant, k: int, start: float, goal: float, clock: 
     section = study.reference
     task = _task(study, plant, k, start, goal)
     if section.kind == "bspline":
-        return solve(task, clock).spline
+        return solve(task, clock).spline.coordinate(0)
     spline = quintic(start, goal, clock, section.durations_s[k])
     broken = violations(spline, task.limits)
     if broken:

@@ -9,13 +9,17 @@ from collections.abc import Iterator
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from .errors import InvalidInputError
 from .plants import Parameter, defaults
 
+if TYPE_CHECKING:
+    from .motion_study import MotionStudy
+
+T = TypeVar("T", bound=BaseModel)
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Pair = tuple[float, float]
@@ -27,11 +31,13 @@ RESERVED = ("worst-case", "witness")
 LARGEST = 1e12
 
 
-class _Section(BaseModel):
+class Section(BaseModel):
+    """A section of a study file: unknown keys and infinite numbers are errors."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
 
 
-class StudySection(_Section):
+class StudySection(Section):
     """Name of the study and what it is about."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
@@ -39,7 +45,7 @@ class StudySection(_Section):
     summary: str = ""
 
 
-class ParameterSection(_Section):
+class ParameterSection(Section):
     """One plant parameter."""
 
     value: float
@@ -48,7 +54,7 @@ class ParameterSection(_Section):
     source: Literal["table", "derived", "public", "assumed"]
 
 
-class PlantSection(_Section):
+class PlantSection(Section):
     """The machine."""
 
     model: Literal["pmsm_emla"]
@@ -81,7 +87,7 @@ class PlantSection(_Section):
         return result
 
 
-class UncertaintySection(_Section):
+class UncertaintySection(Section):
     """What the proof covers besides parameter tolerances."""
 
     load_force_n: Pair
@@ -94,7 +100,7 @@ class UncertaintySection(_Section):
         return self
 
 
-class MotionLimitSection(_Section):
+class MotionLimitSection(Section):
     """Limits of the reference."""
 
     speed_m_s: Positive
@@ -105,7 +111,7 @@ class MotionLimitSection(_Section):
     voltage_v: Positive | None = None
 
 
-class ReferenceSection(_Section):
+class ReferenceSection(Section):
     """The motion to follow: rest-to-rest moves through waypoints, with a dwell at each."""
 
     kind: Literal["quintic", "bspline"]
@@ -133,7 +139,7 @@ class ReferenceSection(_Section):
         return self
 
 
-class GainSection(_Section):
+class GainSection(Section):
     """A gain: fixed by `value`, or searched between `min` and `max`."""
 
     value: Annotated[float, Field(ge=0)] | None = None
@@ -151,7 +157,7 @@ class GainSection(_Section):
         return self
 
 
-class ControllerSection(_Section):
+class ControllerSection(Section):
     """The law, its rate and its gains."""
 
     law: Literal["rac"]
@@ -160,7 +166,7 @@ class ControllerSection(_Section):
     gains: dict[str, GainSection]
 
 
-class RequirementSection(_Section):
+class RequirementSection(Section):
     """What the design must meet, in every validated scenario."""
 
     tracking_error_m: Positive
@@ -172,7 +178,7 @@ class RequirementSection(_Section):
     peak_voltage_v: Positive | None = None
 
 
-class WeightSection(_Section):
+class WeightSection(Section):
     """Weights of the closed-loop cost."""
 
     rms_error: NonNegative = 1.0
@@ -187,7 +193,7 @@ class WeightSection(_Section):
         return self
 
 
-class TuningSection(_Section):
+class TuningSection(Section):
     """Search budget of the second stage."""
 
     method: Literal["jaya", "tlbo", "random", "gradient"] = "jaya"
@@ -198,7 +204,7 @@ class TuningSection(_Section):
     weights: WeightSection = WeightSection()
 
 
-class FaultSection(_Section):
+class FaultSection(Section):
     """An actuator that loses effectiveness; outside the assumptions of a proof."""
 
     share: Annotated[float, Field(ge=0, le=1)]
@@ -207,7 +213,7 @@ class FaultSection(_Section):
     stuck: Annotated[tuple[float, ...], Field(max_length=2)] = ()
 
 
-class ScenarioSection(_Section):
+class ScenarioSection(Section):
     """One simulated run."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
@@ -220,7 +226,7 @@ class ScenarioSection(_Section):
     fault: FaultSection | None = None
 
 
-class ValidationSection(_Section):
+class ValidationSection(Section):
     """Closed-loop runs after the proof."""
 
     transient_s: NonNegative = 1.0
@@ -230,7 +236,7 @@ class ValidationSection(_Section):
     scenarios: Annotated[tuple[ScenarioSection, ...], Field(min_length=1)]
 
 
-class Study(_Section):
+class Study(Section):
     """A whole study file."""
 
     study: StudySection
@@ -294,7 +300,7 @@ def bundled() -> list[str]:
 
 
 def load(name: str) -> Study:
-    """Read a study.
+    """Read a study of a design.
 
     Args:
         name: Name of a bundled study, or path of a TOML file.
@@ -305,26 +311,41 @@ def load(name: str) -> Study:
     Raises:
         InvalidInputError: one line with the rule, what came, and what would do.
     """
+    found = load_any(name)
+    if not isinstance(found, Study):
+        raise InvalidInputError(
+            f'{name}: a design needs a controller: this study is of a motion alone; use "hdmm-opt trajectory {name}"'
+        )
+    return found
+
+
+def load_any(name: str) -> Study | MotionStudy:
+    """Read a study of a design, or of a motion alone; as `load`."""
     if name in bundled():
-        return parse((resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8"), name)
+        return _parse((resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8"), name)
     path = Path(name)
     if path.suffix != ".toml" and not path.exists():
         raise InvalidInputError(
             f'no bundled study is named "{name}"; {nearest(name, bundled())} (or give a .toml path)'
         )
     try:
-        return parse(path.read_text(encoding="utf-8"), str(path))
+        return _parse(path.read_text(encoding="utf-8"), str(path))
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
         raise InvalidInputError(f"{path}: cannot read the study file: {reason}; check the path") from None
 
 
-def parse(text: str, where: str) -> Study:
+def _parse(text: str, where: str) -> Study | MotionStudy:
     """Read a study from TOML text; `where` names it in errors."""
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InvalidInputError(f"{where}: not valid TOML: {error}; correct that line") from None
+    plant = data.get("plant")
+    if isinstance(plant, dict) and plant.get("model") == "crane":
+        from .motion_study import MotionStudy
+
+        return _validated(data, where, MotionStudy)
     return validated(data, where)
 
 
@@ -334,6 +355,10 @@ def validated(data: dict[str, Any], where: str) -> Study:
     Raises:
         InvalidInputError: one line with the rule, what came, and what would do.
     """
+    return _validated(data, where, Study)
+
+
+def _validated(data: dict[str, Any], where: str, kind: type[T]) -> T:
     try:
         numbers = list(_numbers(data))
     except InvalidInputError as error:
@@ -344,9 +369,9 @@ def validated(data: dict[str, Any], where: str) -> Study:
                 f"{where}: {path} must be within ±{LARGEST:g} in SI units: got {value:g}; check the unit"
             )
     try:
-        return Study.model_validate(data)
+        return kind.model_validate(data)
     except ValidationError as error:
-        raise InvalidInputError(f"{where}: {_one_line(error)}") from None
+        raise InvalidInputError(f"{where}: {_one_line(error, kind)}") from None
 
 
 def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
@@ -363,7 +388,7 @@ def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
         yield path, float(data) if isinstance(data, float) or abs(data) < 10**300 else math.copysign(1e300, data)
 
 
-def _one_line(error: ValidationError) -> str:
+def _one_line(error: ValidationError, whole: type[BaseModel]) -> str:
     """The first problem as one line: the rule, what came, what would do."""
     problems = error.errors()
     first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
@@ -372,7 +397,7 @@ def _one_line(error: ValidationError) -> str:
     shown = repr(value) if isinstance(value, str) else f"{value}"
     shown = shown if len(shown) <= 40 else shown[:37] + "..."
     if kind == "extra_forbidden":
-        return f'unknown key "{path}"; {nearest(place[-1], _known_keys(place[:-1]))}'
+        return f'unknown key "{path}"; {nearest(place[-1], _known_keys(whole, place[:-1]))}'
     if kind == "missing":
         return f'"{path}" is required and missing; add it'
     if kind == "value_error":
@@ -392,9 +417,9 @@ def _one_line(error: ValidationError) -> str:
     return f"{path} {rule[0].lower()}{rule[1:]}: got {shown}; correct the value"
 
 
-def _known_keys(place: list[str]) -> list[str]:
+def _known_keys(whole: Any, place: list[str]) -> list[str]:
     """Field names of the section at a place of the file."""
-    section: Any = Study
+    section: Any = whole
     for part in place:
         annotation = section.model_fields[part].annotation if part in getattr(section, "model_fields", {}) else None
         found = _models(annotation)

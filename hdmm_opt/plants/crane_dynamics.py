@@ -144,7 +144,8 @@ class Drives:
         current: Motor currents, A, amplitude.
         voltage: Phase voltages, V, amplitude.
         power: Electrical power drawn, W; negative where a motor feeds back.
-        loss: Copper loss, W.
+        loss: Power drawn that is not passed to the rod, W: copper, viscous friction, gear, screw and rod friction, and
+            what speeds the rotors up, which a motion from rest to rest gives back.
     """
 
     force: Any
@@ -186,10 +187,10 @@ def drives(
     electrical = POLE_PAIRS * turning
     across = known["resistance"] * current + known["inductance"] * slope + known["flux"] * electrical
     along = -known["inductance"] * electrical * current
-    loss = 1.5 * known["resistance"] * current**2
+    copper = 1.5 * known["resistance"] * current**2
     return Drives(
         force=force, speed=turning, torque=torque, current=current,
-        voltage=ca.sqrt(across**2 + along**2 + 1e-12), power=torque * turning + loss, loss=loss,
+        voltage=ca.sqrt(across**2 + along**2 + 1e-12), power=torque * turning + copper, loss=torque * turning + copper - force * speed,
     )  # fmt: skip
 
 

@@ -157,7 +157,7 @@ def test_terms_that_do_not_fit_are_refused():
 
 def test_effort_is_the_inverse_of_the_plant():
     plant = build("torque")
-    torque = np.array(effort(plant, 60e3)(0.2, 0.05, 0.2, 0.0)[0]).ravel()[0]
+    torque = np.array(effort(plant, 60e3)[0](0.2, 0.05, 0.2, 0.0)).ravel()[0]
     assert rate(plant, [0.2, 0.05, torque], [0], [60e3])[1] == pytest.approx(0.2, rel=1e-12)
 
 

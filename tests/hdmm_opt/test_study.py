@@ -28,7 +28,7 @@ def swapped(old, new, name="emla-p2"):
     return text(name).replace(old, new, 1)
 
 
-@pytest.mark.parametrize("name", study.bundled())
+@pytest.mark.parametrize("name", [name for name in study.bundled() if isinstance(study.load_any(name), study.Study)])
 def test_bundled_studies_are_valid_and_survive_the_round_trip(name):
     loaded = study.load(name)
     assert loaded.study.name == name and loaded.study.summary
