@@ -324,14 +324,13 @@ def _run_motion(chosen: Any, output: Path | None) -> int:
             )  # fmt: skip
         except LimitViolatedError as error:
             raise InvalidInputError(f"{chosen.study.name}: {error}") from None
-    click.echo(
-        f"{'motion':20} {'time [s]':>9} {'energy [J]':>11} {'lost [J]':>9} {'effort [s]':>10} {'efficiency':>10}"
-    )
+    heads = ("time [s]", "energy [J]", "lost [J]", "effort [s]", "efficiency")
+    click.echo(f"{'motion':20}" + "".join(f"{head:>12}" for head in heads))
     for motions in found.references:
         total = motions.totals
         click.echo(
-            f"{motions.name:20} {motions.duration:9.4g} {total['energy']:11.5g} {total['loss']:9.5g} "
-            f"{total['effort']:10.3g} {motions.efficiency:10.3f}"
+            f"{motions.name:20}{motions.duration:12.4g}{total['energy']:12.5g}{total['loss']:12.5g}"
+            f"{total['effort']:12.3g}{motions.efficiency:12.3f}"
         )
     click.echo(f"{found.evaluations} decisions of the leader; every motion is inside its limits for all t", err=True)
     click.echo(f"assumed, to be replaced by yours: {', '.join(ASSUMED)}", err=True)

@@ -27,7 +27,7 @@ UNITS = ("rad", "rad", "m")
 ASSUMED = (
     "least lever arm", "limits of joint rates, accelerations and jerks", "mounting of the actuators",
     "frames of the telescope's parts and of the end mass",
-    *(name.replace("_", " ") for name, p in defaults("voltage").items() if p.source == "assumed" and name != "load_mass"),
+    *(key.replace("_", " ") for key, p in defaults("voltage").items() if p.source == "assumed" and key != "load_mass"),
 )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Quantities and running costs at the collocation points of a motion, with derivatives by its variables.
 
 They are functions of w = (x and its derivatives per unit time, T, slacks) at each point, and w is a constant sparse
-matrix times the variables: their derivatives are those of one small function, spread by sparse matrices that are made once.
+matrix times the variables: their derivatives are those of one small function, spread by sparse matrices made once.
 """
 
 from __future__ import annotations

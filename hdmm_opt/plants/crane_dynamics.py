@@ -188,10 +188,16 @@ def drives(
     across = known["resistance"] * current + known["inductance"] * slope + known["flux"] * electrical
     along = -known["inductance"] * electrical * current
     copper = 1.5 * known["resistance"] * current**2
+    power = torque * turning + copper
     return Drives(
-        force=force, speed=turning, torque=torque, current=current,
-        voltage=ca.sqrt(across**2 + along**2 + 1e-12), power=torque * turning + copper, loss=torque * turning + copper - force * speed,
-    )  # fmt: skip
+        force=force,
+        speed=turning,
+        torque=torque,
+        current=current,
+        voltage=ca.sqrt(across**2 + along**2 + 1e-12),
+        power=power,
+        loss=power - force * speed,
+    )
 
 
 #: Largest force, motor speed, torque, current and voltage of an EMLA, with units.
