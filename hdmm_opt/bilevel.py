@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,7 +22,7 @@ from trajectories import LimitViolatedError, Motion, Waypoint, solve
 
 from .crane_task import COSTS, crane_cost, crane_task, joint_limits, running_costs, tool_function
 from .errors import InvalidInputError
-from .plants.crane import tool
+from .plants.crane import reach
 
 Array = NDArray[np.float64]
 
@@ -216,7 +215,7 @@ def _near(job: Job, place: Sequence[float], at: Array) -> Array:
     low, high = joint_limits(job.least_lever).room
     best: tuple[float, Array] | None = None
     for w3 in np.linspace(0.1, 0.9, 9) * high[2]:
-        found = _reached(place, float(w3), at)
+        found = reach(place, float(w3), at)
         if found is not None and (found >= low).all() and (found <= high).all():
             far = float(np.abs(found - at).max())
             best = (far, found) if best is None or far < best[0] else best
@@ -227,26 +226,10 @@ def _near(job: Job, place: Sequence[float], at: Array) -> Array:
 
 def _configuration(job: Job, place: Sequence[float], w3: float, near: Array) -> Array:
     """Joint coordinates at a place of the tool with a given extension."""
-    found = _reached(place, w3, near)
+    found = reach(place, w3, near)
     low, high = joint_limits(job.least_lever).room
     if found is None or (found < low).any() or (found > high).any():
         raise LimitViolatedError(
             f"the tool cannot reach ({place[0]:g}, {place[1]:g}) m with an extension of {w3:.4g} m; choose another"
         )
     return found
-
-
-def _reached(place: Sequence[float], w3: float, near: Array) -> Array | None:
-    """Solve the two angles for the tool's place by Newton's method; None where it does not converge."""
-    w = ca.SX.sym("w", 2)
-    across, up = tool(ca.vertcat(w, w3))
-    residual = ca.vertcat(across - place[0], up - place[1])
-    step = ca.Function("step", [w], [residual, ca.jacobian(residual, w)])
-    angles = np.array(near[:2], dtype=float)
-    for _ in range(50):
-        value, slope = (np.array(part) for part in step(angles))
-        if np.abs(value).max() < 1e-12:
-            return np.append(angles, w3)
-        change = np.linalg.lstsq(slope, value, rcond=None)[0].ravel()
-        angles = angles - change * min(1.0, 0.5 / max(np.abs(change).max(), 1e-12))
-    return None

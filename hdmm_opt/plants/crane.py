@@ -14,10 +14,15 @@ cylinders.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InvalidInputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,3 +115,32 @@ def tool(w: Any) -> tuple[Any, Any]:
     across = BASE[0] + ELBOW[0] * c1 - ELBOW[1] * s1 + reach * c12 - TOOL[1] * s12
     up = BASE[1] + ELBOW[0] * s1 + ELBOW[1] * c1 + reach * s12 + TOOL[1] * c12
     return across, up
+
+
+def reach(place: Sequence[float], extension: float, near: Any) -> NDArray[np.float64] | None:
+    """Joint coordinates at which the tool is at a place, with a given extension of the telescope.
+
+    Args:
+        place: Horizontal and vertical position of the tool, m.
+        extension: Extension of the telescope, m.
+        near: Joint coordinates from which Newton's method starts; it chooses between elbow up and down.
+
+    Returns:
+        Coordinates, shape (3,), whether or not they are inside the ranges of the joints; None where the method does
+        not converge.
+    """
+    import casadi as ca
+    import numpy as np
+
+    w = ca.SX.sym("w", 2)
+    across, up = tool(ca.vertcat(w, extension))
+    residual = ca.vertcat(across - place[0], up - place[1])
+    step = ca.Function("step", [w], [residual, ca.jacobian(residual, w)])
+    angles = np.array(near[:2], dtype=float)
+    for _ in range(50):
+        value, slope = (np.array(part) for part in step(angles))
+        if np.abs(value).max() < 1e-12:
+            return np.append(angles, extension)
+        change = np.linalg.lstsq(slope, value, rcond=None)[0].ravel()
+        angles = angles - change * min(1.0, 0.5 / max(np.abs(change).max(), 1e-12))
+    return None

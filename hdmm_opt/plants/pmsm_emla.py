@@ -122,6 +122,19 @@ def shaft_torque(force: Any, speed: Any, acceleration: Any, values: Mapping[str,
     return inertia * acceleration - driving
 
 
+def steady_power(force: Any, speed: Any, values: Mapping[str, Any]) -> Any:
+    """Electrical power at constant speed against a force, W; negative where the motor feeds back.
+
+    Args:
+        force: Force on the rod without its friction, N.
+        speed: Speed of the rod, m/s.
+        values: Values of the parameters of the voltage level by name.
+    """
+    torque = shaft_torque(force, speed, 0.0, values)
+    current = torque / (1.5 * POLE_PAIRS * values["flux"])
+    return torque * (speed / values["transmission"]) + 1.5 * values["resistance"] * current**2
+
+
 def _symbols(states: int, inputs: int, known: Mapping[str, Parameter]) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
     import casadi as ca
 

@@ -1,0 +1,116 @@
+"""Motions of the crane whose tool follows a prescribed path within a tolerance; the joints share the work freely.
+
+The path coordinate s is a fourth coordinate of the motion, and the tool's distance from the path at s a quantity of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from trajectories import Guess, MotionLimits, Path, Quantities, Task, Waypoint
+from trajectories.spline import clamped_knots, fitted
+
+from .crane_task import drive_quantities, joint_limits
+from .enclosure import enclosure
+from .errors import InvalidInputError
+from .plants.crane import reach, tool
+
+
+def tool_path_task(
+    path: Path, start: Sequence[float], *, tolerance: float, payload: float = 0.0, **options: Any
+) -> tuple[Task, Guess]:
+    """The quickest motion, or that of another cost, along a path of the tool from rest to rest.
+
+    Args:
+        path: Path of the tool in the plane of the crane, s -> (2,), m.
+        start: Joint coordinates at its start, rad, rad, m; the tool must be there. The end's are free.
+        tolerance: Largest distance of the tool from the path, m, for all t.
+        payload: Mass at the tool, kg, beside the end mass.
+        options: Further entries of `Task`. A running cost takes the four coordinates.
+
+    Returns:
+        The task, and a guess whose tool is on the path with the extension of the start.
+
+    Raises:
+        InvalidInputError: a tolerance that is not positive, a start off the path, or a path that cannot be reached
+            with the extension of the start.
+    """
+    if not tolerance > 0:
+        raise InvalidInputError(f"a path is followed within a positive tolerance: got {tolerance:g} m; widen it")
+    first = np.asarray(start, dtype=float)
+    off = float(np.hypot(*(np.array([float(x) for x in tool(first)]) - path([0.0])[0])))
+    if not off <= tolerance:
+        raise InvalidInputError(
+            f"the tool starts on its path: got {off:.4g} m beside it, the tolerance is {tolerance:g} m; "
+            "move the start of one of them"
+        )
+    joints = joint_limits()
+    low, high = joints.room
+    limits = MotionLimits(
+        position=(np.append(low, 0.0), np.append(high, 1.0)),
+        speed=np.append(joints.of(1), np.inf), acceleration=np.append(joints.of(2), np.inf),
+        jerk=np.append(joints.of(3), np.inf), names=(*joints.names, "path"), units=(*joints.units, "1"),
+    )  # fmt: skip
+    places = _along(path, first)
+    task = Task(
+        waypoints=(
+            Waypoint(value=np.append(first, 0.0)),
+            Waypoint(value=np.array([np.nan] * 3 + [1.0]), near=np.append(places[-1], 1.0)),
+        ),
+        limits=limits,
+        quantities=_quantities(path, tolerance, payload),
+        **options,
+    )
+    return task, _guess(task, places)
+
+
+def _along(path: Path, first: np.ndarray) -> np.ndarray:
+    """Joint coordinates on the path with the extension of the start. Shape (points, 3)."""
+    low, high = joint_limits().room
+    found = [first]
+    for s in np.linspace(0.0, 1.0, 101)[1:]:
+        place = path([s])[0]
+        w = reach(place, float(first[2]), found[-1])
+        if w is None or (w < low).any() or (w > high).any():
+            raise InvalidInputError(
+                f"the tool reaches its path with the extension of the start, {first[2]:g} m: it cannot at "
+                f"({place[0]:.4g}, {place[1]:.4g}) m, {100 * s:.0f} % of it; "
+                "start with another extension, or move the path"
+            )
+        found.append(w)
+    return np.array(found)
+
+
+def _quantities(path: Path, tolerance: float, payload: float) -> Quantities:
+    drives = drive_quantities(float(payload))
+    curves = [ca.SX.sym(name, 4) for name in "xvaj"]
+    place = ca.vertcat(*tool(curves[0][:3]))
+    away = ca.sumsqr(place - path.function(curves[0][3]))
+    # as the clearance of a ball: a distance near the tolerance, and smooth on the path
+    room = (tolerance**2 - away) / (2 * tolerance)
+    function = ca.Function("path", curves, [ca.densify(ca.vertcat(drives.function(*(c[:3] for c in curves)), room))])
+    return Quantities(
+        function=function,
+        names=(*drives.names, "room to the tolerance"),
+        units=(*drives.units, "m"),
+        lower=np.append(drives.lower, 0.0),
+        upper=np.append(drives.upper, np.inf),
+        enclose=enclosure(function),
+    )
+
+
+def _guess(task: Task, places: np.ndarray) -> Guess:
+    """Along the places with a quintic law, in the time that the limits of the joints take for the whole way."""
+    unit = np.linspace(0.0, 1.0, 8 * (task.spans + task.degree))
+    law = 10 * unit**3 - 15 * unit**4 + 6 * unit**5
+    shares = np.linspace(0.0, 1.0, len(places))
+    values = np.stack([np.interp(law, shares, column) for column in places.T] + [law], axis=1)
+    knots = clamped_knots(0.0, 1.0, task.spans, task.degree)
+    way = np.abs(np.diff(places, axis=0)).sum(axis=0)
+    duration = 3.0 * float((way / task.limits.of(1)[:3]).max()) + 1.0
+    points = np.clip(fitted(unit, values, knots, task.degree).coefficients, *task.limits.room)
+    return Guess(points=(points,), durations=np.array([task.duration or min(duration, task.longest)]))
