@@ -322,20 +322,20 @@ def load(name: str) -> Study:
 def load_any(name: str) -> Study | MotionStudy:
     """Read a study of a design, or of a motion alone; as `load`."""
     if name in bundled():
-        return _parse((resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8"), name)
+        return parse((resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8"), name)
     path = Path(name)
     if path.suffix != ".toml" and not path.exists():
         raise InvalidInputError(
             f'no bundled study is named "{name}"; {nearest(name, bundled())} (or give a .toml path)'
         )
     try:
-        return _parse(path.read_text(encoding="utf-8"), str(path))
+        return parse(path.read_text(encoding="utf-8"), str(path))
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
         raise InvalidInputError(f"{path}: cannot read the study file: {reason}; check the path") from None
 
 
-def _parse(text: str, where: str) -> Study | MotionStudy:
+def parse(text: str, where: str) -> Study | MotionStudy:
     """Read a study from TOML text; `where` names it in errors."""
     try:
         data = tomllib.loads(text)
