@@ -311,30 +311,45 @@ def _run_motion(chosen: Any, output: Path | None) -> int:
     """The motions of a study without a controller."""
     from trajectories import LimitViolatedError
 
-    from .bilevel import bilevel
     from .crane_task import ASSUMED
     from .motion_file import document
 
     with bar() as progress:
         progress.stage(chosen.study.name)
         try:
-            found = bilevel(
-                chosen.job(), chosen.reference.evaluations,
-                lambda done, of, best: progress.update(done / of, f"lost {best:.4g} J"),
-            )  # fmt: skip
+            ways = _ways(chosen, progress)
         except LimitViolatedError as error:
             raise InvalidInputError(f"{chosen.study.name}: {error}") from None
     heads = ("time [s]", "energy [J]", "lost [J]", "effort [s]", "efficiency")
     click.echo(f"{'motion':20}" + "".join(f"{head:>12}" for head in heads))
-    for motions in found.references:
-        total = motions.totals
+    for way in ways:
+        total = way.totals
         click.echo(
-            f"{motions.name:20}{motions.duration:12.4g}{total['energy']:12.5g}{total['loss']:12.5g}"
-            f"{total['effort']:12.3g}{motions.efficiency:12.3f}"
+            f"{way.name:20}{way.duration:12.4g}{total['energy']:12.5g}{total['loss']:12.5g}"
+            f"{total['effort']:12.3g}{way.efficiency:12.3f}"
         )
-    click.echo(f"{found.evaluations} decisions of the leader; every motion is inside its limits for all t", err=True)
+    click.echo("every motion is inside its limits for all t", err=True)
     click.echo(f"assumed, to be replaced by yours: {', '.join(ASSUMED)}", err=True)
     if output is not None:
-        write_text(output, gain_file.to_text(document(chosen, found)))
+        write_text(output, gain_file.to_text(document(chosen, ways)))
         click.echo(str(output))
     return PROVED
+
+
+def _ways(chosen: Any, progress: Any) -> Any:
+    """The motions by the study's kind of reference."""
+    from .bilevel import bilevel
+    from .crane_task import crane_cost
+    from .job import carried_out
+
+    section = chosen.reference
+    if section.kind == "bilevel":
+        budget = section.evaluations or 24
+        return bilevel(
+            chosen.job(), budget, lambda done, best: progress.update(done / budget, f"lost {best:.4g} J")
+        ).ways
+    weights = {"time": 1.0} if section.cost is None else section.cost.model_dump()
+    found = carried_out(
+        chosen.job(), lambda payload: crane_cost(payload=payload, **weights), "spline program", spans=section.spans
+    )
+    return (found,)

@@ -1,19 +1,25 @@
-"""Leader and follower: energy balances, the one-level bound, and the study that shows them."""
+"""Leader and follower, and motions from study files: energy balances, the one-level bound, limits, messages."""
 
 import json
 
 import numpy as np
+import pinocchio
 import pytest
+from click.testing import CliRunner
+from test_crane_dynamics import Closed
 
 from hdmm_opt import study
-from hdmm_opt.bilevel import Job, bilevel
+from hdmm_opt.bilevel import bilevel
+from hdmm_opt.cli import main
 from hdmm_opt.crane_task import drive_quantities, joint_limits, tool_function
 from hdmm_opt.errors import InvalidInputError
+from hdmm_opt.job import Job, Move
 from hdmm_opt.motion_file import document
 from hdmm_opt.motion_study import MotionStudy
 from trajectories import LimitViolatedError, violations
 
-JOB = Job(start=(0.2, -1.2, 0.2), places=((3.0, 2.2),), payloads=(60.0,), longest=40.0, least_lever=0.08)
+START, PLACE = (0.2, -1.2, 0.2), (3.0, 2.2)
+JOB = Job(start=START, moves=(Move(tool=PLACE, payload=60.0),), longest=40.0)
 
 
 @pytest.fixture(scope="module")
@@ -22,14 +28,14 @@ def found():
 
 
 def test_every_motion_is_inside_its_limits_and_reaches_its_place(found):
-    assert [m.name for m in found.references] == [
+    assert [m.name for m in found.ways] == [
         "time-optimal",
         "effort-optimal",
         "energy-optimal",
         "leader and follower",
     ]
     quantities = drive_quantities(60.0)
-    for motions in found.references:
+    for motions in found.ways:
         (motion,) = motions.motions
         assert not violations(motion.spline, joint_limits(JOB.least_lever))
         values = quantities.values(motion.spline, np.linspace(0, motion.spline.end, 4001))
@@ -37,12 +43,12 @@ def test_every_motion_is_inside_its_limits_and_reaches_its_place(found):
         assert np.array(tool_function()(motion.spline.coefficients[-1])).ravel() == pytest.approx(
             JOB.places[0], abs=1e-6
         )
-        assert motion.spline.coefficients[0] == pytest.approx(JOB.start)
+        assert motion.spline.coefficients[0] == pytest.approx(START)
 
 
 def test_energy_is_what_is_lost_and_what_is_lifted(found):
     """Electrical energy less the losses is the change of potential energy, by the heights of the bodies."""
-    for motions in found.references:
+    for motions in found.ways:
         ends = motions.motions[0].spline.coefficients[[0, -1]]
         gained = motions.totals["energy"] - motions.totals["loss"]
         lifted = [potential(w, 60.0) for w in ends]
@@ -52,61 +58,111 @@ def test_energy_is_what_is_lost_and_what_is_lifted(found):
 
 def potential(w, payload):
     """Of chain, cylinders, rods and payload, from Pinocchio's kinematics of the same file."""
-    import pinocchio
-    from test_crane_dynamics import Closed
-
     closed = Closed(payload)
     q, _ = closed.state(np.array(w), np.zeros(3))
     return pinocchio.computePotentialEnergy(closed.model, closed.data, q)
 
 
 def test_one_level_bounds_two_and_speed_costs_energy(found):
-    quick, easy, frugal, led = (m.totals["loss"] for m in found.references)
+    quick, easy, frugal, led = (m.totals["loss"] for m in found.ways)
     assert frugal <= led * (1 + 1e-6) < quick
     assert led < 1.25 * frugal and easy > frugal
-    times = {m.name: m.duration for m in found.references}
+    times = {m.name: m.duration for m in found.ways}
     assert times["time-optimal"] <= min(times.values()) * (1 + 1e-6)
-    assert all(0.0 < m.efficiency < 1.0 for m in found.references)
-    assert max(found.references, key=lambda m: m.efficiency).name == "energy-optimal"
-    assert found.evaluations == len(found.history) <= 9 and list(found.history) == sorted(found.history, reverse=True)
+    assert all(0.0 < m.efficiency < 1.0 for m in found.ways)
+    assert max(found.ways, key=lambda m: m.efficiency).name == "energy-optimal"
+    assert 4 <= len(found.history) <= 9 and list(found.history) == sorted(found.history, reverse=True)
 
 
 def test_the_study_is_of_a_motion_alone(found):
     chosen = study.load_any("crane-p14")
-    assert isinstance(chosen, MotionStudy) and chosen.job().payloads == (60.0, 0.0)
+    assert isinstance(chosen, MotionStudy) and [move.payload for move in chosen.job().moves] == [60.0, 0.0]
     with pytest.raises(InvalidInputError, match='use "hdmm-opt trajectory crane-p14"'):
         study.load("crane-p14")
-    text = json.dumps(document(chosen, found), allow_nan=False)
-    data = json.loads(text)
+    data = json.loads(json.dumps(document(chosen, found.ways), allow_nan=False))
     assert data["schema"] == "hdmm-opt/motions/1" and "motor inertia" in data["assumed"]
-    for row in data["references"]:
-        for move in row["moves"]:
+    for way in data["ways"]:
+        for move in way["moves"]:
             assert len(move["knots_s"]) == len(move["control_points"]) + move["degree"] + 1
-            assert all(bound["lower"] <= bound["upper"] <= bound["limit"] for bound in move["bounds"])
+            for bound in move["bounds"]:
+                assert bound["lower_limit"] <= bound["lower"] <= bound["upper"] <= bound["upper_limit"]
+
+
+FILE = """
+[study]
+name = "mine"
+[plant]
+model = "crane"
+[reference]
+kind = "bspline"
+start_rad_rad_m = [0.2, -1.2, 0.2]
+longest_s = 40.0
+[reference.cost]
+time = 1.0
+effort = 0.5
+[[reference.moves]]
+tool_m = [3.0, 2.2]
+via_m = [[3.1, 1.2]]
+payload_kg = 60.0
+[[reference.moves]]
+joints_rad_rad_m = [0.2, -1.2, 0.2]
+[[reference.obstacles]]
+name = "post"
+centre_m = [2.3, 1.4]
+radius_m = 0.3
+[[reference.obstacles]]
+name = "ground"
+normal = [0.0, -1.0]
+offset_m = 1.0
+"""
+
+
+def test_a_study_of_moves_makes_motions_past_obstacles(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(FILE)
+    job = study.load_any(str(path)).job()
+    result = CliRunner().invoke(main, ["trajectory", str(path), "-o", str(tmp_path / "mine.json")])
+    assert result.exit_code == 0 and "spline program" in result.output and "assumed" in result.output
+    data = json.loads((tmp_path / "mine.json").read_text())
+    (way,) = data["ways"]
+    assert len(way["moves"]) == 2 and len(way["moves"][0]["arrivals_s"]) == 2
+    clear = {bound["name"]: bound for bound in way["moves"][0]["bounds"] if bound["name"].startswith("clearance")}
+    assert set(clear) == {"clearance of post", "clearance of ground"}
+    assert all(bound["lower"] >= 0.0 and bound["upper_limit"] is None for bound in clear.values())
+    ends = np.array(way["moves"][0]["control_points"])[-1], np.array(way["moves"][1]["control_points"])[-1]
+    assert np.array(tool_function()(ends[0])).ravel() == pytest.approx(PLACE, abs=1e-6)
+    assert ends[1] == pytest.approx(START) and len(job.obstacles) == 2
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("old", "new", "message"),
     [
-        ({"start_rad_rad_m": [2.5, -1.2, 0.2]}, "must keep the lift between"),
-        ({"moves": []}, "at least 1 entries"),
-        ({"evaluation": 3}, 'did you mean "evaluations"'),
+        ("start_rad_rad_m = [0.2", "start_rad_rad_m = [2.5", "must keep the lift between"),
+        ("joints_rad_rad_m = [0.2", "joints_rad_rad_m = [2.5", r"reference\.moves\.1\.joints_rad_rad_m must keep the lift"),
+        ("longest_s = 40.0", "longest = 40.0", 'did you mean "longest_s"'),
+        ("longest_s = 40.0", "evaluations = 4", "evaluations has no place"),
+        ('kind = "bspline"', 'kind = "bilevel"', "has no cost and no via_m"),
+        ("time = 1.0\neffort = 0.5", "time = 0.0", "needs one weight above zero"),
+        ("radius_m = 0.3\n", "", "needs either centre_m and radius_m"),
+        ("normal = [0.0, -1.0]", "normal = [0.0, -2.0]", "must have length 1"),
+        ("tool_m = [3.0, 2.2]", "", "needs either tool_m or joints_rad_rad_m"),
     ],
-)
-def test_wrong_studies_say_what_would_do(tmp_path, change, message):
-    data = study.load_any("crane-p14").model_dump(mode="json", exclude_none=True)
-    data["reference"] |= change
-    lines = ["[study]", 'name = "x"', "[plant]", 'model = "crane"', "[reference]"]
-    lines += [f"{key} = {json.dumps(value)}" for key, value in data["reference"].items() if key != "moves"]
-    lines += ["moves = []"] if not data["reference"]["moves"] else ["[[reference.moves]]", "tool_m = [3.0, 2.2]"]
-    path = tmp_path / "x.toml"
-    path.write_text("\n".join(lines))
+)  # fmt: skip
+def test_wrong_studies_say_what_would_do(old, new, message):
+    assert old in FILE
     with pytest.raises(InvalidInputError, match=message):
-        study.load_any(str(path))
+        study.parse(FILE.replace(old, new, 1), "mine.toml")
 
 
-def test_a_place_out_of_reach_is_refused():
-    with pytest.raises(LimitViolatedError, match=r"cannot reach \(9, 9\) m"):
-        bilevel(Job(start=(0.2, -1.2, 0.2), places=((9.0, 9.0),), payloads=(0.0,), longest=40.0, least_lever=0.08), 2)
-    with pytest.raises(InvalidInputError, match="a payload for each place"):
-        Job(start=(0.2, -1.2, 0.2), places=((3.0, 2.2),), payloads=(), longest=40.0, least_lever=0.08)
+def test_what_cannot_be_done_names_the_move(tmp_path):
+    far = Job(start=START, moves=(Move(tool=PLACE), Move(tool=(9.0, 9.0))))
+    with pytest.raises(LimitViolatedError, match=r"move 2: the tool cannot reach \(9, 9\) m"):
+        bilevel(far, 2)
+    with pytest.raises(InvalidInputError, match="one of the two"):
+        Move()
+    with pytest.raises(InvalidInputError, match="no places to pass"):
+        bilevel(Job(start=START, moves=(Move(tool=PLACE, via=((3.0, 1.0),)),)), 2)
+    path = tmp_path / "mine.toml"
+    path.write_text(FILE.replace("tool_m = [3.0, 2.2]", "tool_m = [9.0, 9.0]"))
+    result = CliRunner().invoke(main, ["trajectory", str(path)])
+    assert result.exit_code == 2 and "mine: move 1: the tool cannot reach (9, 9) m; move the place" in result.output

@@ -1,0 +1,165 @@
+"""A job of the crane: moves from rest to rest, each with its payload, and the motions that carry it out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajectories import LimitViolatedError, Motion, Obstacle, Task, Waypoint, solve
+
+from .crane_task import COSTS, crane_task, joint_limits, running_costs, tool_function
+from .errors import InvalidInputError
+from .plants.crane import reach
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Move:
+    """A move to a place, given for the tool or for the joints.
+
+    Attributes:
+        tool: Place of the tool, m, shape (2,); the joints are free to share the way. None where `joints` is given.
+        joints: Joint coordinates, rad, rad, m, shape (3,).
+        via: Places of the tool that it passes without a stop, m. Shape (places, 2).
+        payload: Mass at the tool, kg, beside the end mass.
+    """
+
+    tool: tuple[float, float] | None = None
+    joints: tuple[float, float, float] | None = None
+    via: tuple[tuple[float, float], ...] = ()
+    payload: float = 0.0
+
+    def __post_init__(self) -> None:
+        if (self.tool is None) == (self.joints is None):
+            raise InvalidInputError("a move goes to a place of the tool or to joint coordinates: give one of the two")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """Moves from rest to rest.
+
+    Attributes:
+        start: Joint coordinates at the start, rad, rad, m. Shape (3,).
+        moves: The moves, one after the other.
+        obstacles: What the tool keeps clear of.
+        longest: Longest admissible duration of a move, s.
+        least_lever: Shortest admissible lever arm of the actuators of lift and tilt, m/rad.
+    """
+
+    start: tuple[float, float, float]
+    moves: tuple[Move, ...]
+    obstacles: tuple[Obstacle, ...] = ()
+    longest: float = 60.0
+    least_lever: float = 0.08
+
+    def task(self, waypoints: Sequence[Any], payload: float, **options: Any) -> Task:
+        """A move of the job as a task."""
+        limits = joint_limits(self.least_lever)
+        return crane_task(waypoints, payload=payload, obstacles=self.obstacles, limits=limits, **options)
+
+    def inside(self, w: Array | None) -> bool:
+        """Whether joint coordinates are inside the ranges of the job; None is not."""
+        low, high = joint_limits(self.least_lever).room
+        return w is not None and bool((w >= low).all() and (w <= high).all())
+
+    def near(self, place: Sequence[float], at: Array) -> Array:
+        """Joint coordinates at a place of the tool, the nearest to given ones of a few extensions.
+
+        Raises:
+            LimitViolatedError: the tool cannot reach the place.
+        """
+        longest = joint_limits(self.least_lever).room[1][2]
+        tried = [reach(place, float(share * longest), at) for share in np.linspace(0.1, 0.9, 9)]
+        found = [w for w in tried if w is not None and self.inside(w)]
+        if not found:
+            raise LimitViolatedError(f"the tool cannot reach ({place[0]:g}, {place[1]:g}) m; move the place")
+        return min(found, key=lambda w: float(np.abs(w - at).max()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motions:
+    """The motions of a job.
+
+    Attributes:
+        name: How they were chosen.
+        job: The job.
+        motions: One for each move.
+    """
+
+    name: str
+    job: Job
+    motions: tuple[Motion, ...]
+
+    @property
+    def duration(self) -> float:
+        """Time of all moves, s."""
+        return sum(motion.parts["time"] for motion in self.motions)
+
+    @cached_property
+    def totals(self) -> dict[str, float]:
+        """Integrals of electrical power, J, of what is lost of it, J, and of effort, s, over all moves."""
+        values = [
+            self._integrals(motion, move.payload)[0] for motion, move in zip(self.motions, self.job.moves, strict=True)
+        ]
+        return dict(zip(COSTS, np.sum(values, axis=0).tolist(), strict=True))
+
+    @cached_property
+    def efficiency(self) -> float:
+        """Work that leaves the rods while the motors draw power, over the energy drawn then."""
+        both = [
+            self._integrals(motion, move.payload)[1] for motion, move in zip(self.motions, self.job.moves, strict=True)
+        ]
+        useful, drawn = np.sum(both, axis=0)
+        return float(useful / drawn)
+
+    @staticmethod
+    def _integrals(motion: Motion, payload: float) -> tuple[Array, Array]:
+        """Integrals of the running costs; of the power at the rods and of that drawn, where it is drawn."""
+        from scipy.integrate import trapezoid
+
+        t = np.linspace(motion.spline.start, motion.spline.end, 4001)
+        rates = np.array(running_costs(payload).map(len(t))(*(motion.spline(t, order).T for order in range(4))))
+        power, lost, _ = rates
+        drawn = np.maximum(power, 0.0)
+        return trapezoid(rates, t), trapezoid([np.where(power > 0, power - lost, 0.0), drawn], t)
+
+
+def carried_out(job: Job, cost: Callable[[float], Any], name: str, **options: Any) -> Motions:
+    """Each move by itself on one level: where the tool has a place, the joints share the way as costs least.
+
+    Args:
+        job: The job.
+        cost: The cost for a payload.
+        name: Name of the result.
+        options: Further entries of `trajectories.Task`.
+
+    Raises:
+        LimitViolatedError: a move that no motion inside the limits makes; the message says which.
+
+    Not guaranteed: that moves chosen one by one are best together.
+    """
+    motions: list[Motion] = []
+    at = np.array(job.start)
+    for number, move in enumerate(job.moves, 1):
+        try:
+            waypoints: list[Any] = [at]
+            for place in move.via:
+                near = job.near(place, at if len(waypoints) == 1 else waypoints[-1].guess)
+                waypoints.append(Waypoint(value=np.array(place), through=tool_function(), near=near))
+            if move.tool is not None:
+                near = job.near(move.tool, at)
+                waypoints.append(Waypoint(value=np.array(move.tool), through=tool_function(), near=near))
+            else:
+                waypoints.append(np.array(move.joints))
+            task = job.task(waypoints, move.payload, cost=cost(move.payload), longest=job.longest, **options)
+            motions.append(solve(task))
+        except LimitViolatedError as error:
+            raise LimitViolatedError(f"move {number}: {error}") from None
+        at = motions[-1].spline.coefficients[-1]
+    return Motions(name=name, job=job, motions=tuple(motions))
