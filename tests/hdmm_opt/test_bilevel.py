@@ -40,9 +40,7 @@ def test_every_motion_is_inside_its_limits_and_reaches_its_place(found):
         assert not violations(motion.spline, joint_limits(JOB.least_lever))
         values = quantities.values(motion.spline, np.linspace(0, motion.spline.end, 4001))
         assert (values <= quantities.upper[:, None]).all() and (values >= quantities.lower[:, None]).all()
-        assert np.array(tool_function()(motion.spline.coefficients[-1])).ravel() == pytest.approx(
-            JOB.places[0], abs=1e-6
-        )
+        assert np.array(tool_function()(motion.spline.coefficients[-1])).ravel() == pytest.approx(PLACE, abs=1e-6)
         assert motion.spline.coefficients[0] == pytest.approx(START)
 
 
