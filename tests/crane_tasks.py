@@ -17,7 +17,7 @@ def place(random, payload):
     low, high = joint_limits().position
     while True:
         w = random.uniform(low + 0.02 * (high - low), high - 0.02 * (high - low))
-        if not at_rest(crane_task([w, w], payload=payload), w) and tool_function()(w)[1] > -1.9:
+        if not at_rest(crane_task([w, low], payload=payload), w) and tool_function()(w)[1] > -1.9:
             return w
 
 

@@ -12,55 +12,53 @@ from .spline import Spline
 
 Array = NDArray[np.float64]
 
-#: Room for the rounding of control points, relative to the largest of them.
-ROUNDING = 1e-12
+#: Derivatives that pieces carry: position … snap.
+ORDERS = 5
+#: Units of rounding that making and halving control points may cost.
+_UNITS = 64 * np.finfo(float).eps
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pieces:
-    """Polynomial pieces of a motion.
+    """Polynomial pieces of a motion and of its derivatives.
 
     Attributes:
-        points: Bezier control points. Shape (pieces, degree + 1, n).
+        curves: Bezier control points of position … snap. Shapes (pieces, points, n).
+        room: Bound on the rounding of the control points of each. Shape (5, n).
         start: First time of each piece, s. Shape (pieces,).
         width: Duration of each piece, s. Shape (pieces,).
     """
 
-    points: Array
+    curves: tuple[Array, ...]
+    room: Array
     start: Array
     width: Array
 
     def chosen(self, mask: Any) -> Pieces:
         """Some of the pieces, by a mask or a slice."""
-        return Pieces(points=self.points[mask], start=self.start[mask], width=self.width[mask])
+        curves = tuple(curve[mask] for curve in self.curves)
+        return Pieces(curves=curves, room=self.room, start=self.start[mask], width=self.width[mask])
 
     def halved(self) -> Pieces:
-        """Every piece cut in the middle (de Casteljau): all left halves, then all right halves."""
-        left, right, points = [self.points[:, 0]], [self.points[:, -1]], self.points
-        while points.shape[1] > 1:
-            points = (points[:, :-1] + points[:, 1:]) / 2
-            left.append(points[:, 0])
-            right.append(points[:, -1])
+        """Every piece cut in the middle: all left halves, then all right halves."""
         half = self.width / 2
         return Pieces(
-            points=np.concatenate([np.stack(left, axis=1), np.stack(right[::-1], axis=1)]),
+            curves=tuple(np.concatenate(_halves(curve)) for curve in self.curves),
+            room=self.room,
             start=np.concatenate([self.start, self.start + half]),
             width=np.concatenate([half, half]),
         )
 
-    def ranges(self, orders: int) -> tuple[Array, Array]:
-        """Lower and upper bounds of the derivatives 0 … orders - 1 on each piece. Each shape (orders, n, pieces)."""
-        low, high = [], []
-        points, degree = self.points, self.points.shape[1] - 1
-        for order in range(orders):
-            room = ROUNDING * np.abs(points).max(axis=1)
-            low.append(points.min(axis=1) - room)
-            high.append(points.max(axis=1) + room)
-            if order < degree:
-                points = (degree - order) * np.diff(points, axis=1) / self.width[:, None, None]
-            else:
-                points = np.zeros_like(points)
-        return np.stack(low).swapaxes(1, 2), np.stack(high).swapaxes(1, 2)
+    def ranges(self) -> tuple[Array, Array]:
+        """Lower and upper bounds of position … snap on each piece. Each shape (5, n, pieces)."""
+        low = np.stack([curve.min(axis=1) for curve in self.curves]).swapaxes(1, 2)
+        high = np.stack([curve.max(axis=1) for curve in self.curves]).swapaxes(1, 2)
+        return low - self.room[:, :, None], high + self.room[:, :, None]
+
+    def middles(self) -> tuple[Array, Array]:
+        """The same at the middle of each piece alone."""
+        points = np.stack([_halves(curve)[1][:, 0] for curve in self.curves]).swapaxes(1, 2)
+        return points - self.room[:, :, None], points + self.room[:, :, None]
 
 
 def pieces(spline: Spline) -> Pieces:
@@ -72,7 +70,28 @@ def pieces(spline: Spline) -> Pieces:
         for _ in range(degree - count):
             knots, points = _inserted(knots, points, knot, degree)
     index = degree * np.arange(len(edges) - 1)[:, None] + np.arange(degree + 1)
-    return Pieces(points=points[index], start=edges[:-1], width=np.diff(edges))
+    width = np.diff(edges)
+    curves, rooms = [points[index]], [_UNITS * np.abs(points).max(axis=0)]
+    for order in range(1, ORDERS):
+        left = degree + 1 - order
+        if left < 1:
+            curves.append(np.zeros_like(curves[0][:, :1]))
+            rooms.append(np.zeros_like(rooms[0]))
+            continue
+        curves.append(left * np.diff(curves[-1], axis=1) / width[:, None, None])
+        # the error of a difference of two control points, each with its own, over the narrowest piece
+        rooms.append(2 * left * rooms[-1] / width.min() + _UNITS * np.abs(curves[-1]).max(axis=(0, 1)))
+    return Pieces(curves=tuple(curves), room=np.stack(rooms), start=edges[:-1], width=width)
+
+
+def _halves(points: Array) -> tuple[Array, Array]:
+    """Control points of the left and the right half (de Casteljau)."""
+    left, right = [points[:, 0]], [points[:, -1]]
+    while points.shape[1] > 1:
+        points = (points[:, :-1] + points[:, 1:]) / 2
+        left.append(points[:, 0])
+        right.append(points[:, -1])
+    return np.stack(left, axis=1), np.stack(right[::-1], axis=1)
 
 
 def _inserted(knots: Array, points: Array, knot: float, degree: int) -> tuple[Array, Array]:

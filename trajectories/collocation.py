@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .diagnosis import at_rest, refusal, relaxed
+from .diagnosis import Relaxation, at_rest, refusal, relaxed
 from .guess import Guess, guesses, straight
 from .limits import LimitViolatedError, violations
 from .nodes import POINTS, TIGHTENING, gauss
 from .program import Program, build
 from .quantity import Peaks, peaks
-from .solver import AGAIN, assembled, bounds, solver_of
+from .solver import AGAIN, FLOOR, assembled, bounds, solver_of
 from .spline import Spline, clamped_knots
 from .task import Cost, Task
 
@@ -24,6 +24,14 @@ Array = NDArray[np.float64]
 ROUNDS = 8
 #: How much further than the excess a limit is tightened where the motion left it.
 FORWARD = 1.2
+#: A limit is tightened by no more than this share in a round.
+LARGEST = 0.1
+#: No limit of a quantity is tightened past the middle of its band, less this share.
+NARROWEST = 1e-6
+#: How often a search that ends at the shortest admitted duration goes on below it.
+FLOORS = 5
+#: Factors on the widening of limits that are tried, to find one of which it is true that it would do.
+GROWTHS = (1.0, 1.5, 3.0, 8.0)
 #: A motion longer than this, s, is not searched for.
 LONGEST = 1e4
 
@@ -76,22 +84,37 @@ def solve(task: Task, begin: float = 0.0, guess: Guess | None = None) -> Motion:
     _reject_places(task)
     given = [guess] if guess is not None else list(guesses(task))
     first = _Attempt(task, given[0])
-    motion = first.run(begin)
-    if motion is not None:
-        return motion
-    relaxation = relaxed(task, given[0])
-    starts = given[1:] if relaxation is None or relaxation.widened else [relaxation.guess, *given[1:]]
-    for start in starts:
-        motion = _Attempt(task, start).run(begin)
-        if motion is not None:
-            return motion
-    raise refusal(task, relaxation, first.failure, _shortest(task))
+    motion, relaxation = first.run(), None
+    if motion is None:
+        relaxation = relaxed(task, given[0])
+        known = [] if relaxation is None or relaxation.widened else [relaxation.guess]
+        tried = (_Attempt(task, start).run() for start in [*known, *given[1:]])
+        motion = next((found for found in tried if found is not None), None)
+    if motion is None:
+        raise refusal(task, _reasons(task, relaxation), first.failure, _shortest(task))
+    return _from(motion, begin)
+
+
+def _from(motion: Motion, begin: float) -> Motion:
+    """The motion, found from time 0, at its time: the knots alone move."""
+    spline = Spline(knots=begin + motion.spline.knots, coefficients=motion.spline.coefficients)
+    return replace(motion, spline=spline, arrivals=tuple(begin + t for t in motion.arrivals))
+
+
+def _reasons(task: Task, relaxation: Relaxation | None) -> str:
+    """What has to give way, and wider limits with which a motion was found and verified."""
+    if relaxation is None or not relaxation.widened:
+        return ""
+    for growth in GROWTHS:
+        if _Attempt(relaxation.task(task, growth), relaxation.guess).run() is not None:
+            return relaxation.text(growth)
+    return relaxation.text(None)
 
 
 def _shortest(task: Task) -> float | None:
     """Duration of the quickest motion inside the limits, s; None where none was found."""
     longer = replace(task, cost=Cost(), duration=None, longest=LONGEST)
-    motion = _Attempt(longer, straight(longer)).run(0.0)
+    motion = _Attempt(longer, straight(longer)).run()
     return None if motion is None else motion.parts["time"]
 
 
@@ -119,38 +142,53 @@ class _Attempt:
         self.iterations = 0
         self.failure = ""
 
-    def run(self, begin: float) -> Motion | None:
+    def run(self) -> Motion | None:
+        """The motion from time 0; None where none was found, and `failure` says why."""
+        task, start = self.task, self.start
+        for _ in range(FLOORS):
+            motion, floored = self._rounds(start)
+            if not floored:
+                return motion
+            # the search ended at the shortest duration that it admits: go on below it
+            start = Guess(points=start.points, durations=start.durations * FLOOR)
+        self.failure = f"nothing that is limited keeps the motion from taking no time, of {task.longest:g} s"
+        return None
+
+    def _rounds(self, start: Guess) -> tuple[Motion | None, bool]:
+        """Solve, verify and tighten; and whether a duration ended at its lower bound."""
         task = self.task
-        program = build(task, 1.0 / max(_first_cost(task, self.start), 1e-12))
-        solver = solver_of(program)
-        x = program.shape.packed(list(self.start.points), self.start.durations)
+        program = build(task, 1.0 / max(_first_cost(task, start), 1e-12))
+        solver, again = solver_of(program), None
+        x = program.shape.packed(list(start.points), start.durations)
         upper, lower = program.upper.copy(), program.lower.copy()
         known: dict[str, Any] = {}
-        again = None
         for rounds in range(1, ROUNDS + 1):
-            answer = solver(x0=x, lbg=lower, ubg=upper, **bounds(task, program, self.start), **known)
+            answer = solver(x0=x, lbg=lower, ubg=upper, **bounds(task, program, start), **known)
             self.iterations += solver.stats()["iter_count"]
             x = np.array(answer["x"]).ravel()
             if not solver.stats()["success"]:
                 self.failure = str(solver.stats()["return_status"])
-                return None
-            spline, arrivals = assembled(task, program.shape, x, begin)
+                return None, False
+            durations = program.shape.unpacked(x)[1]
+            if task.duration is None and (durations < 1.5 * FLOOR * start.durations).any():
+                return None, True
+            spline, arrivals = assembled(task, program.shape, x)
             found = peaks(spline, task.quantities) if task.quantities is not None else None
-            if not violations(spline, task.limits) and (found is None or found.inside):
-                return self._motion(spline, arrivals, found, rounds)
-            self.failure = "limits between the collocation points"
-            if found is not None:
-                _tighten(task, program, found, lower, upper)
+            broken = violations(spline, task.limits)
+            if not broken and (found is None or found.inside):
+                return self._motion(spline, arrivals, found, rounds), False
+            self.failure = "; ".join(broken) or "a quantity outside its limits between the collocation points"
+            if found is None or found.inside:
+                return None, False
+            _tighten(task, program, found, lower, upper)
             solver = again = again or solver_of(program, **AGAIN)
             known = {"lam_x0": answer["lam_x"], "lam_g0": answer["lam_g"]}
-        return None
+        return None, False
 
     def _motion(self, spline: Spline, arrivals: tuple[float, ...], found: Peaks | None, rounds: int) -> Motion:
         parts = integrals(self.task, spline)
-        weights = {"time": self.task.cost.time, "jerk": self.task.cost.jerk}
-        weights |= dict(zip(self.task.cost.names, self.task.cost.weights, strict=True))
         return Motion(
-            spline=spline, arrivals=arrivals, cost=sum(weights[name] * value for name, value in parts.items()),
+            spline=spline, arrivals=arrivals, cost=self.task.cost.value(parts),
             parts=parts, peaks=found, rounds=rounds, iterations=self.iterations,
         )  # fmt: skip
 
@@ -176,9 +214,7 @@ def _first_cost(task: Task, start: Guess) -> float:
     total = 0.0
     for own, coefficients in zip(knots, start.points, strict=True):
         parts = integrals(task, Spline(knots=own, coefficients=coefficients))
-        weights = {"time": task.cost.time, "jerk": task.cost.jerk}
-        weights |= dict(zip(task.cost.names, task.cost.weights, strict=True))
-        total += sum(weights[name] * abs(value) for name, value in parts.items())
+        total += task.cost.value({name: abs(value) for name, value in parts.items()})
     return total
 
 
@@ -187,12 +223,21 @@ def _tighten(task: Task, program: Program, found: Peaks, lower: Array, upper: Ar
     given = task.quantities
     assert given is not None
     kept = np.flatnonzero(np.isfinite(given.lower) | np.isfinite(given.upper))
-    excess = FORWARD * found.excess / given.scale[:, None] + np.where(found.excess > 0, TIGHTENING, 0.0)
-    beside = np.pad(excess, ((0, 0), (1, 1)))
-    excess = np.maximum(excess, np.maximum(beside[:, :-2], beside[:, 2:]) / 2)[kept]
-    phases = np.split(excess, task.phases, axis=1)
-    # each phase: its first point, those of its spans, its last point; rest at an end leaves nothing to move
-    per_node = [np.pad(np.repeat(own, POINTS, axis=1), ((0, 0), (1, 1))) for own in phases]
-    change = np.concatenate(per_node, axis=1).T.ravel()
-    upper[-change.size :] -= change
-    lower[-change.size :] += change
+    count = program.nodes * len(kept)
+    low, high = (
+        _per_node(task, outside / given.scale[:, None])[kept].T.ravel() for outside in (found.under, found.over)
+    )
+    if count:
+        middle = (lower[-count:] + upper[-count:]) / 2  # infinite where one side is free
+        lower[-count:] = np.minimum(lower[-count:] + low, np.where(np.isfinite(middle), middle - NARROWEST, np.inf))
+        upper[-count:] = np.maximum(upper[-count:] - high, np.where(np.isfinite(middle), middle + NARROWEST, -np.inf))
+
+
+def _per_node(task: Task, outside: Array) -> Array:
+    """How far to tighten at each point: a little more than a span's excess, half of it in its neighbours."""
+    change = FORWARD * np.minimum(outside, LARGEST) + np.where(outside > 0, TIGHTENING, 0.0)
+    beside = np.pad(change, ((0, 0), (1, 1)))
+    change = np.maximum(change, np.maximum(beside[:, :-2], beside[:, 2:]) / 2)
+    # the ends of a phase stay: at rest they were checked before
+    parts = [np.pad(np.repeat(own, POINTS, axis=1), ((0, 0), (1, 1))) for own in np.split(change, task.phases, axis=1)]
+    return np.concatenate(parts, axis=1)

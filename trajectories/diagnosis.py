@@ -1,14 +1,16 @@
-"""Why there is no motion inside the limits: the limit, the place, the amount, and the smallest change that would do."""
+"""Why there is no motion inside the limits: the limit, the place, the amount, and a change that would do."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .guess import Guess
 from .limits import ORDERS, LimitViolatedError
+from .nodes import TIGHTENING
 from .program import build
 from .solver import assembled, bounds, solver_of
 from .spline import Spline
@@ -16,8 +18,32 @@ from .task import Limit, Task
 
 Array = NDArray[np.float64]
 
+#: Share of a limit that a place of rest must leave, because the program keeps half of it.
+RESERVE = 2 * TIGHTENING
 #: Slacks below this count as none.
 NONE = 1e-5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Widening:
+    """A limit that has to give way.
+
+    Attributes:
+        limit: The limit.
+        slack: How far, in units of its scale, in the program.
+        place: What is over or under it, where on the way, as text.
+    """
+
+    limit: Limit
+    slack: float
+    place: str
+
+    def least(self, growth: float) -> float:
+        """A wider limit, rounded outwards to four digits; `growth` widens it further."""
+        side = self.limit.side or 1
+        value = self.limit.value + (1.01 * growth * self.slack + growth * RESERVE) * self.limit.scale * side
+        unit = 10.0 ** (math.floor(math.log10(abs(value) or 1.0)) - 3)
+        return float(f"{(math.ceil if side > 0 else math.floor)(value / unit) * unit:.6g}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,11 +52,31 @@ class Relaxation:
 
     Attributes:
         guess: The motion.
-        widened: For each limit that gives way: its place on the motion and what would do, as text.
+        widened: The limits that give way, the one that gives most first.
     """
 
     guess: Guess
-    widened: tuple[str, ...]
+    widened: tuple[Widening, ...]
+
+    def task(self, task: Task, growth: float) -> Task:
+        """The task with wider limits."""
+        sizes = {name: np.array(task.limits.of(order)) for order, name in ORDERS.items()}
+        given = task.quantities
+        ends = None if given is None else {1: np.array(given.upper), -1: np.array(given.lower)}
+        for step in self.widened:
+            target = sizes[ORDERS[step.limit.order]] if step.limit.order else (ends or {})[step.limit.side]
+            target[step.limit.index] = step.least(growth)
+        if given is not None and ends is not None:
+            given = replace(given, upper=ends[1], lower=ends[-1])
+        return replace(task, limits=replace(task.limits, **sizes), quantities=given)
+
+    def text(self, growth: float | None) -> str:
+        """What gives way, and with a `growth` that was confirmed, what would do."""
+        parts = []
+        for step in self.widened:
+            would = "" if growth is None else f": {step.least(growth):g} {step.limit.unit} would do"
+            parts.append(f"{step.limit.name} {step.place}{would}")
+        return ", together with ".join(parts)
 
 
 def at_rest(task: Task, place: Array) -> str:
@@ -42,12 +88,16 @@ def at_rest(task: Task, place: Array) -> str:
     values = np.array(given.function(place, still, still, still)).ravel()
     found = []
     for i, value in enumerate(values):
-        for end, beyond in ((given.upper[i], value > given.upper[i]), (given.lower[i], value < given.lower[i])):
+        room = min(RESERVE * given.scale[i], (given.upper[i] - given.lower[i]) / 2)
+        for end, beyond in (
+            (given.upper[i], value > given.upper[i] - room),
+            (given.lower[i], value < given.lower[i] + room),
+        ):
             if beyond:
                 unit = given.units[i]
                 found.append(
-                    f"{given.names[i]} is {value:.5g} {unit}, its limit {end:.5g} {unit}: that limit must be wider, "
-                    "or the place another"
+                    f"{given.names[i]} is {value:.6g} {unit}, its limit {end:.6g} {unit} less {100 * RESERVE:g} % in "
+                    "reserve: that limit must be wider, or the place another"
                 )
     return "; ".join(found)
 
@@ -63,52 +113,45 @@ def relaxed(task: Task, start: Guess) -> Relaxation | None:
         return None
     x = np.array(answer["x"]).ravel()
     slacks = x[program.shape.size - program.shape.slacks :]
-    spline, _ = assembled(task, program.shape, x, 0.0)
-    times = np.linspace(spline.start, spline.end, 2001)
+    spline, _ = assembled(task, program.shape, x)
     found = []
-    for index in np.argsort(-slacks):
-        limit, slack = program.limits[int(index)], float(slacks[index])
+    for i in np.argsort(-slacks):
+        limit, slack = program.limits[i], float(slacks[i])
         if slack > NONE:
-            least = limit.value + (1.01 * slack + 2e-4) * limit.scale * (limit.side or 1)
-            found.append(f"{_where(task, limit, spline, times)}; {least:.4g} {limit.unit} would do")
+            found.append(Widening(limit=limit, slack=slack, place=_place(task, limit, slack, spline)))
     points, durations = program.shape.unpacked(x)
     return Relaxation(guess=Guess(points=tuple(points), durations=durations), widened=tuple(found))
 
 
-def refusal(task: Task, relaxation: Relaxation | None, status: str, shortest: float | None) -> LimitViolatedError:
+def refusal(task: Task, reasons: str, status: str, shortest: float | None) -> LimitViolatedError:
     """The error for a task without a motion.
 
     Args:
         task: The task.
-        relaxation: What limits would have to give way, all of them together.
+        reasons: What limits would have to give way; empty where none is known.
         status: What the first attempt ended with.
         shortest: Duration of the quickest motion inside the limits, s; None where none is known.
     """
-    admitted = task.duration or task.longest
-    remedies = [" and ".join(relaxation.widened)] if relaxation is not None and relaxation.widened else []
+    admitted = task.longest if task.duration is None else task.duration
+    remedies = [reasons] if reasons else []
     if shortest is not None and shortest > admitted:
-        remedies.append(f"with the limits as they are, {1.001 * shortest:.4g} s would do")
+        remedies.append(f"with the limits as they are, {1.001 * shortest:.5g} s would do")
     if not remedies:
         remedies.append(f"the search stopped with: {status}; start it from elsewhere, or move the waypoints")
     return LimitViolatedError(f"no motion within {admitted:g} s respects the limits: {'; '.join(remedies)}")
 
 
-def _where(task: Task, limit: Limit, spline: Spline, times: Array) -> str:
-    if limit.side:
-        assert task.quantities is not None
-        row = task.quantities.values(spline, times)[task.quantities.names.index(limit.name)]
+def _place(task: Task, limit: Limit, slack: float, spline: Spline) -> str:
+    """By how much and where a limit is passed, by the program's value and the samples' place."""
+    times = np.linspace(spline.start, spline.end, 2001)
+    if limit.order:
+        row = np.abs(spline(times, limit.order).reshape(len(times), -1)[:, limit.index])
     else:
-        order, k = next(
-            (order, k)
-            for order in ORDERS
-            for k in range(len(task.limits.names))
-            if task.limits.title(order, k) == limit.name
-        )
-        row = np.abs(spline(times, order).reshape(len(times), -1)[:, k])
+        assert task.quantities is not None
+        row = task.quantities.values(spline, times)[limit.index]
     worst = int(np.argmin(row) if limit.side < 0 else np.argmax(row))
     word = "under" if limit.side < 0 else "over"
-    share = 100 * times[worst] / spline.end
     return (
-        f"{limit.name} would be {row[worst]:.4g} {limit.unit} at {times[worst]:.3g} s, {share:.0f} % of the way, "
-        f"{word} its limit {limit.value:g} {limit.unit}"
+        f"would be {slack * limit.scale:.3g} {limit.unit} {word} its limit {limit.value:g} {limit.unit} at "
+        f"{times[worst]:.3g} s, {100 * times[worst] / spline.end:.0f} % of the way"
     )

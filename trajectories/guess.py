@@ -61,7 +61,7 @@ def straight(task: Task, bend: float = 0.0) -> Guess:
         path = line + abs(bend) * 4 * law * (1 - law) * (edge - line)
         points.append(np.clip(fitted(s, path, knots, task.degree).coefficients, low, high))
         durations.append(_duration(task, after.guess - before.guess))
-    share = task.duration / sum(durations) if task.duration else min(1.0, task.longest / sum(durations))
+    share = task.duration / sum(durations) if task.duration is not None else min(1.0, task.longest / sum(durations))
     return Guess(points=tuple(points), durations=share * np.array(durations))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .limits import MotionLimits
+from .limits import LimitViolatedError, MotionLimits, violations
 from .spline import Spline
 
 Array = NDArray[np.float64]
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 #: Knots closer than this share of the duration are one.
 SAME = 1e-9
 #: The limits are kept smaller by this share, because control points of the jerk are differences that round.
-TIGHTENING = 1e-6
+TIGHTENING = 1e-4
 
 
 def jerk_limited(start: ArrayLike, goal: ArrayLike, limits: MotionLimits, begin: float = 0.0) -> Spline:
@@ -32,7 +32,8 @@ def jerk_limited(start: ArrayLike, goal: ArrayLike, limits: MotionLimits, begin:
 
     Raises:
         ImportError: Ruckig is not installed; it is the extra "ruckig".
-        ValueError: start and goal are the same, a limit is missing or not positive, or Ruckig finds no move.
+        ValueError: start and goal are the same, a limit is missing, or Ruckig finds no move.
+        LimitViolatedError: phases so short that the jerk of the spline is lost in rounding.
 
     References:
         L. Berscheid and T. Kroeger (2021), Jerk-limited real-time trajectory generation with arbitrary target states,
@@ -53,7 +54,12 @@ def jerk_limited(start: ArrayLike, goal: ArrayLike, limits: MotionLimits, begin:
     coefficients = np.stack(columns, axis=1)
     coefficients[-3:] = last  # at rest there, up to the rounding of the integration
     knots = begin + np.concatenate([np.zeros(3), times, np.full(3, duration)])
-    return Spline(knots=knots, coefficients=coefficients)
+    spline = Spline(knots=knots, coefficients=coefficients)
+    free = MotionLimits(**{**vars(limits), "position": (-np.inf, np.inf)})
+    broken = violations(spline, free)
+    if broken:
+        raise LimitViolatedError(f"{broken[0]}: phases of the move are too short for its control points; use `solve`")
+    return spline
 
 
 def _profiles(start: Array, goal: Array, limits: MotionLimits) -> tuple[list[Any], float]:

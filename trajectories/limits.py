@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .bezier import pieces
 from .spline import Spline
 
 Array = NDArray[np.float64]
 
+#: A limit counts as kept up to this share, for rounding; a position up to a larger one, for the solver's tolerance
+#: where phases meet.
+ROOM, POSITION_ROOM = 1e-9, 1e-7
 #: Derivatives that have limits, by order.
 ORDERS = {1: "speed", 2: "acceleration", 3: "jerk"}
 
@@ -40,6 +43,11 @@ class MotionLimits:
     names: tuple[str, ...] = ("",)
     units: tuple[str, ...] = ("m",)
 
+    def __post_init__(self) -> None:
+        for order, name in ORDERS.items():
+            if not (self.of(order) > 0).all():
+                raise ValueError(f"a limit of {name} is positive: got {getattr(self, name)}; infinite means none")
+
     def of(self, order: int) -> Array:
         """The largest size of a derivative, for each coordinate. Shape (n,)."""
         return np.broadcast_to(np.asarray(getattr(self, ORDERS[order]), dtype=float), len(self.names))
@@ -60,23 +68,24 @@ class MotionLimits:
 
 
 def violations(spline: Spline, limits: MotionLimits) -> list[str]:
-    """Motion limits that the control points do not respect, as text; empty where all hold for all t."""
+    """Motion limits that the hulls of the spline's pieces do not respect, as text; empty where all hold for all t."""
     found = []
-    low, high = _ends(spline, 0)
+    lows, highs = _hulls(spline)
     for k, (least, most) in enumerate(zip(*limits.room, strict=True)):
-        if not (low[k] >= least and high[k] <= most):
+        low, high, room = lows[0, k], highs[0, k], POSITION_ROOM * max(1.0, float(np.abs([least, most]).max()))
+        if not (low >= least - room and high <= most + room):
             name = f"{limits.names[k]} position".strip()
             unit = limits.units[k]
-            found.append(f"{name} {low[k]:.4g}…{high[k]:.4g} {unit} leaves the stroke {least:g}…{most:g} {unit}")
+            found.append(f"{name} {low:.4g}…{high:.4g} {unit} leaves the stroke {least:g}…{most:g} {unit}")
     for order in ORDERS:
-        low, high = _ends(spline, order)
         for k, limit in enumerate(limits.of(order)):
-            size, unit = max(abs(low[k]), abs(high[k])), limits.unit(order, k)
-            if not size <= limit * (1 + 1e-9):
+            size, unit = max(abs(lows[order, k]), abs(highs[order, k])), limits.unit(order, k)
+            if not size <= limit * (1 + ROOM):
                 found.append(f"{limits.title(order, k)} {size:.4g} {unit} is over the limit {limit:g} {unit}")
     return found
 
 
-def _ends(spline: Spline, order: int) -> tuple[Any, Any]:
-    low, high = spline.bounds(order)
-    return np.atleast_1d(low), np.atleast_1d(high)
+def _hulls(spline: Spline) -> tuple[Array, Array]:
+    """Bounds of position … jerk for all t, by the Bezier points of every piece. Each shape (4, n)."""
+    low, high = pieces(spline).ranges()
+    return low.min(axis=2), high.max(axis=2)

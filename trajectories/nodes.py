@@ -116,7 +116,8 @@ def _limited(values: Any, lower: Array, upper: Array, slack: Any) -> tuple[Any, 
 
     scale = sizes(lower, upper)
     scaled = values / ca.DM(scale)
-    low, high = lower / scale + TIGHTENING, upper / scale - TIGHTENING
+    tight = np.minimum(TIGHTENING, (upper - lower) / scale / 4)
+    low, high = lower / scale + tight, upper / scale - tight
     if not slack.numel():
         kept = np.flatnonzero(np.isfinite(low) | np.isfinite(high))
         return ca.vertcat(*(scaled[int(i)] for i in kept)), low[kept], high[kept]

@@ -20,6 +20,11 @@ class HalfSpace:
     normal: tuple[float, ...]
     offset: float
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "normal", tuple(float(n) for n in self.normal))
+        if not abs(sum(n**2 for n in self.normal) - 1) < 1e-6:
+            raise ValueError(f"a normal has length 1: got {self.normal} for {self.name}; divide it by its length")
+
     def clearance(self, point: Any) -> Any:
         """Distance to the wall, m; negative beyond it. Symbols or numbers, shape (d,)."""
         return self.offset - sum(n * point[i] for i, n in enumerate(self.normal))
@@ -40,6 +45,7 @@ class Ball:
     radius: float
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", tuple(float(c) for c in self.centre))
         if not self.radius > 0:
             raise ValueError(f"a ball needs a positive radius: got {self.radius} m for {self.name}")
 

@@ -99,6 +99,8 @@ def along(
         names += quantities.names
         units += quantities.units
         sizes += zip(quantities.lower, quantities.upper, strict=True)
+    if not rows:
+        raise ValueError("motion along a path needs a finite limit or a quantity: got none; it would take no time")
     function = ca.Function("along", curves, [ca.densify(ca.vertcat(*rows))])
     lower, upper = np.array(sizes).T
     return Quantities(

@@ -86,7 +86,15 @@ def build(task: Task, scale: float, *, relaxed: bool = False) -> Program:
 def relaxable(task: Task) -> tuple[Limit, ...]:
     """The limits that a relaxation may widen: of derivatives, then of quantities."""
     found = [
-        Limit(name=task.limits.title(order, k), unit=task.limits.unit(order, k), value=value, scale=value, side=0)
+        Limit(
+            name=task.limits.title(order, k),
+            unit=task.limits.unit(order, k),
+            value=float(value),
+            scale=float(value),
+            side=0,
+            order=order,
+            index=k,
+        )
         for order in ORDERS
         for k, value in enumerate(task.limits.of(order))
         if np.isfinite(value)
@@ -95,7 +103,15 @@ def relaxable(task: Task) -> tuple[Limit, ...]:
     if given is not None:
         for ends, side in ((given.upper, 1), (given.lower, -1)):
             found += [
-                Limit(name=given.names[i], unit=given.units[i], value=end, scale=given.scale[i], side=side)
+                Limit(
+                    name=given.names[i],
+                    unit=given.units[i],
+                    value=float(end),
+                    scale=float(given.scale[i]),
+                    side=side,
+                    order=0,
+                    index=i,
+                )
                 for i, end in enumerate(ends)
                 if np.isfinite(end)
             ]
@@ -135,7 +151,7 @@ def _smooth(task: Task, shape: Shape, x: Any, scale: float, relaxed: bool) -> tu
         add(row, 0.0, 0.0)
     total = ca.sum1(ca.vertcat(*(duration for _, duration in phases)))
     if shape.phases > 1:
-        add(total, *((task.duration,) * 2 if task.duration else (0.0, task.longest)))
+        add(total, *((task.duration,) * 2 if task.duration is not None else (0.0, task.longest)))
     return ca.vertcat(*rows), np.concatenate(low), np.concatenate(high), (
         ca.sum1(slack) + 1e-6 * total if relaxed else scale * task.cost.time * total
     )  # fmt: skip

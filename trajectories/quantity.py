@@ -44,6 +44,25 @@ class Quantities:
     upper: Array
     enclose: Enclosure
 
+    def __post_init__(self) -> None:
+        for name in ("lower", "upper"):
+            ends = np.array(getattr(self, name), dtype=float)
+            ends.setflags(write=False)
+            object.__setattr__(self, name, ends)
+        count = len(self.names)
+        if not (self.lower.shape == self.upper.shape == (count,) and len(self.units) == count):
+            raise ValueError(
+                f"quantities need a unit and two limits each: got {count} names, {self.lower.shape} limits"
+            )
+        if not (self.lower < self.upper).all():
+            name = self.names[int(np.argmin(self.lower < self.upper))]
+            raise ValueError(f"a quantity needs a lower limit below its upper one: got others for {name}; widen them")
+
+    @property
+    def needs_jerk(self) -> bool:
+        """Whether a quantity depends on jerk."""
+        return bool(self.function.jac_sparsity(0, 3).nnz())
+
     @property
     def scale(self) -> Array:
         """Size of each quantity, from its limits. Shape (q,)."""
@@ -70,16 +89,19 @@ class Peaks:
     Attributes:
         lower: Lower bounds for all t. Shape (q,).
         upper: Upper bounds for all t. Shape (q,).
-        excess: How far the bounds lie outside the limits, 0 where inside, on each span of the motion. Shape (q, spans).
-        lowest: Span in which each lower bound is reached. Shape (q,).
-        highest: Span in which each upper bound is reached. Shape (q,).
+        under: How far the lower bounds lie below the limits, 0 where inside, on each span. Shape (q, spans).
+        over: How far the upper bounds lie above the limits.
     """
 
     lower: Array
     upper: Array
-    excess: Array
-    lowest: NDArray[np.int64]
-    highest: NDArray[np.int64]
+    under: Array
+    over: Array
+
+    @property
+    def excess(self) -> Array:
+        """The larger of `under` and `over`. Shape (q, spans)."""
+        return np.maximum(self.under, self.over)
 
     @property
     def inside(self) -> bool:
@@ -96,7 +118,15 @@ def peaks(spline: Spline, quantities: Quantities) -> Peaks:
 
     Returns:
         The bounds; outside a limit only where cutting could not bring them inside.
+
+    Raises:
+        ValueError: a quantity depends on jerk, and the spline has none: its acceleration jumps.
     """
+    if spline.degree < 3 and quantities.needs_jerk:
+        raise ValueError(
+            f"a quantity that depends on jerk needs a spline of degree 3 or more: got degree {spline.degree}; "
+            "limit the jerk, or leave such quantities out"
+        )
     work = pieces(spline)
     span, spans = np.arange(len(work.start)), len(work.start)
     least, most = _targets(spline, work, quantities)
@@ -113,14 +143,11 @@ def peaks(spline: Spline, quantities: Quantities) -> Peaks:
         work, span = work.chosen(coarse), span[coarse]
         for _ in range(HALVINGS):
             work, span = work.halved(), np.tile(span, 2)
-    outside = np.maximum(high - quantities.upper[:, None], quantities.lower[:, None] - low)
-    return Peaks(
-        lower=low.min(axis=1),
-        upper=high.max(axis=1),
-        excess=np.maximum(outside, 0.0),
-        lowest=low.argmin(axis=1),
-        highest=high.argmax(axis=1),
-    )
+    below, above = quantities.lower[:, None], quantities.upper[:, None]
+    with np.errstate(invalid="ignore"):  # a limit that there is not, and a bound that could not be told
+        under = np.where(np.isfinite(below), np.maximum(below - low, 0.0), 0.0)
+        over = np.where(np.isfinite(above), np.maximum(high - above, 0.0), 0.0)
+    return Peaks(lower=low.min(axis=1), upper=high.max(axis=1), under=under, over=over)
 
 
 def _targets(spline: Spline, work: Pieces, quantities: Quantities) -> tuple[Array, Array]:

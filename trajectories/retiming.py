@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 #: Grid points on the path.
 GRID = 400
+#: Share of the limits below which no further retiming is tried.
+LEAST_SHARE = 0.2
 #: Retimings at the most, each inside tighter limits, until the composed motion is inside the given ones.
 ROUNDS = 6
 
@@ -67,12 +69,14 @@ def retime(
     Raises:
         LimitViolatedError: the path cannot be followed; the message says where it ends being controllable, and what
             is outside its limit there at rest.
+        ValueError: a quantity depends on jerk, which TOPP-RA leaves free.
 
     References:
         H. Pham and Q.-C. Pham (2018), A new approach to time-optimal path parameterization based on reachability
         analysis, IEEE Transactions on Robotics 34, 645-659.
 
-    Not guaranteed: TOPP-RA is optimal on its grid; between grid points s'' is constant.
+    Not guaranteed: TOPP-RA is optimal on its grid; between grid points s'' is constant. Positions are those of the path
+    and are not checked against `limits`.
     """
     free = MotionLimits(
         position=limits.position, speed=limits.speed, acceleration=limits.acceleration, names=limits.names,
@@ -86,10 +90,13 @@ def retime(
         if found.inside:
             return Retimed(law=law, peaks=found, quantities=checked, share=share)
         share *= 1.0 - 1.1 * float((found.excess / checked.scale[:, None]).max()) - 1e-6
+        if not share > LEAST_SHARE:
+            break
     worst = int((found.excess.max(axis=1) / checked.scale).argmax())
     raise LimitViolatedError(
-        f"{checked.names[worst]} stays outside its limit between the grid points of the path, by "
-        f"{found.excess[worst].max():.3g} {checked.units[worst]}; use more than {grid} intervals"
+        f"{checked.names[worst]} stays outside its limit on the retimed path, by {found.excess[worst].max():.3g} "
+        f"{checked.units[worst]}; use more than {grid} intervals, leave out what is not affine in x'' and products of "
+        "speeds, or solve a `path_task`"
     )
 
 
@@ -159,7 +166,8 @@ def _constraints(constraint: Any, limits: MotionLimits, quantities: Quantities |
             own.set_discretization_type(scheme)
         found.append(own)
     if quantities is not None:
-        lower, upper = (share * ends for ends in (quantities.lower, quantities.upper))
+        inwards = (1.0 - share) * quantities.scale
+        lower, upper = quantities.lower + inwards, quantities.upper - inwards
         above, below = (np.flatnonzero(np.isfinite(ends)) for ends in (upper, lower))
         count = len(quantities.names)
         factors = np.concatenate([np.eye(count)[above], -np.eye(count)[below]])

@@ -22,6 +22,8 @@ _IPOPT = {
 }  # fmt: skip
 
 
+#: Least duration of a phase, as a share of the guess.
+FLOOR = 0.02
 #: Further options where the search starts at the solution of nearly the same program.
 AGAIN = {
     "warm_start_init_point": "yes", "mu_strategy": "monotone", "mu_init": 1e-6, "warm_start_bound_push": 1e-8,
@@ -52,15 +54,13 @@ def bounds(task: Task, program: Program, start: Guess) -> dict[str, Array]:
             places = shape.place(phase, np.arange(shape.controls), k)
             low[places], high[places] = least[k], most[k]
         at = shape.duration(phase)
-        low[at] = 0.02 * start.durations[phase] if not task.duration else 1e-3 * task.duration
-        high[at] = task.duration or task.longest
-    if task.duration and shape.phases == 1:
+        low[at] = FLOOR * start.durations[phase] if task.duration is None else 1e-3 * task.duration
+        high[at] = task.longest if task.duration is None else task.duration
+    if task.duration is not None and shape.phases == 1:
         low[shape.duration(0)] = task.duration
     low[shape.size - shape.slacks :] = 0.0
     for places, values in _given(task, shape):
         low[places] = high[places] = values
-    if shape.slacks and not task.duration:
-        low[[shape.duration(p) for p in range(shape.phases)]] = 1e-3 * task.longest
     return {"lbx": low, "ubx": high}
 
 
@@ -80,11 +80,11 @@ def _given(task: Task, shape: Shape) -> list[tuple[Any, float]]:
     return fixed
 
 
-def assembled(task: Task, shape: Shape, x: Array, begin: float) -> tuple[Spline, tuple[float, ...]]:
-    """The spline of a vector of variables, and the times at its waypoints."""
+def assembled(task: Task, shape: Shape, x: Array) -> tuple[Spline, tuple[float, ...]]:
+    """The spline of a vector of variables from time 0, and the times at its waypoints."""
     points, durations = shape.unpacked(x)
     low, high = task.limits.room
-    clock, splines = begin, []
+    clock, splines = 0.0, []
     for own, duration in zip(points, durations, strict=True):
         knots = clamped_knots(clock, clock + float(duration), task.spans, task.degree)
         splines.append(Spline(knots=knots, coefficients=np.clip(own, low, high)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,12 @@ class Waypoint:
     value: Array
     through: Any = None
     near: Array | None = None
+
+    def __post_init__(self) -> None:
+        if self.through is not None and self.near is None:
+            raise ValueError(
+                "a place that a function gives needs coordinates near it to start from: got none; give near"
+            )
 
     @property
     def guess(self) -> Array:
@@ -63,6 +70,19 @@ class Cost:
     names: tuple[str, ...] = ()
     weights: tuple[float, ...] = ()
 
+    def __post_init__(self) -> None:
+        count = 0 if self.running is None else self.running.numel_out(0)
+        if not len(self.names) == len(self.weights) == count:
+            raise ValueError(
+                f"every running cost needs a name and a weight: got {count} costs, {len(self.names)} names and "
+                f"{len(self.weights)} weights"
+            )
+
+    def value(self, parts: dict[str, float]) -> float:
+        """The weighted sum of a duration, a squared jerk and running costs."""
+        known = {"time": self.time, "jerk": self.jerk, **dict(zip(self.names, self.weights, strict=True))}
+        return sum(known[name] * part for name, part in parts.items())
+
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
@@ -95,9 +115,15 @@ class Task:
         for rule, right, got in (
             ("a motion needs two waypoints or more", len(self.waypoints) >= 2, len(self.waypoints)),
             ("a spline needs degree 3 or more", self.degree >= 3, self.degree),
-            ("a motion needs spans", self.spans >= 2, self.spans),
+            ("a motion needs two spans or more, and control points for its rest at both ends",
+             self.spans >= 2 and self.spans + self.degree >= 2 * self.rest, self.spans),
+            ("a motion goes from one place to another, and not to the same one",
+             all(not np.array_equal(a.guess, b.guess) for a, b in pairwise(self.waypoints)),
+             [w.guess.tolist() for w in self.waypoints]),
             ("rest is 2 or 3", self.rest in (2, 3), self.rest),
-            ("a motion needs a positive duration", self.longest > 0 and (self.duration or 1.0) > 0, self.duration),
+            ("a motion takes a positive, finite time", 0 < self.longest < np.inf, self.longest),
+            ("a given duration is positive and finite", self.duration is None or 0 < self.duration < np.inf,
+             self.duration),
             (f"waypoints need {count} coordinates, or a place to start the search from",
              all(w.guess.shape == (count,) and np.isfinite(w.guess).all() for w in self.waypoints),
              [w.guess.tolist() for w in self.waypoints]),
@@ -121,6 +147,8 @@ class Limit:
         value: The limit.
         scale: What a relaxation of 1 adds to it.
         side: +1 for an upper limit, -1 for a lower one, 0 for a limit of the size.
+        order: Order of the derivative that is limited; 0 for a quantity.
+        index: Which coordinate, or which quantity.
     """
 
     name: str
@@ -128,3 +156,5 @@ class Limit:
     value: float
     scale: float
     side: int
+    order: int
+    index: int

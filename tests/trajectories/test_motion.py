@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hdmm_opt.enclosure import enclosure
 from trajectories import (
     Ball,
     Cost,
@@ -156,7 +157,7 @@ def around(obstacle):
     x, v, a, j = (ca.SX.sym(n, 3) for n in "xvaj")
 
     def enclose(found):
-        low, high = found.ranges(1)
+        low, high = found.ranges()
         low, high = low[0], high[0]
         centre = np.array(obstacle.centre)[:, None]
         far = np.maximum(np.abs(low[:2] - centre), np.abs(high[:2] - centre))
@@ -209,3 +210,145 @@ def test_never_faster_than_the_jerk_limited_optimum_of_the_coordinates(values):
     if np.abs(goal - start).max() > 0.05:
         motion = solve(Task(waypoints=(at(*start), at(*goal)), limits=limits, spans=40))
         assert best.end * (1 - 1e-6) <= motion.cost <= 1.06 * best.end
+
+
+def test_a_waypoint_may_lie_on_a_limit():
+    """The polygon of the joined spline passes the limit there, the hulls of its pieces do not."""
+    places = [(0, 0, 0.5), (0.5, 0.4, 0.0), (1.0, 0.0, 1.0), (0.2, 0.3, 0.4)]
+    motion = solve(Task(waypoints=tuple(at(*p) for p in places), limits=LIMITS))
+    t = np.linspace(0, motion.spline.end, 20_001)
+    assert motion.spline(t)[:, 2].min() >= -1e-9 and motion.spline(t)[:, 2].max() <= 1 + 1e-9
+    assert motion.spline([motion.arrivals[0]])[0] == pytest.approx(places[1], abs=1e-7)
+
+
+def test_bounds_that_are_infinite_are_refused_and_not_followed():
+    x, v, a, j = (ca.SX.sym(n, 3) for n in "xvaj")
+    nothing = Quantities(
+        function=ca.Function("q", [x, v, a, j], [v[0]]), names=("speed",), units=("rad/s",), lower=np.array([-np.inf]),
+        upper=np.array([1.0]), enclose=wide(-np.inf, np.inf),
+    )  # fmt: skip
+    with pytest.raises(LimitViolatedError, match="within 60 s"):
+        solve(Task(waypoints=(at(0, 0, 0), at(1.0, 0.1, 0.3)), limits=LIMITS, quantities=nothing))
+
+
+def test_several_limits_that_are_in_the_way_would_do_together():
+    places = [(0, 0, 0), (1.0, 0.5, 0.8), (1.5, 1.0, 0.2)]
+    task = Task(waypoints=tuple(at(*p) for p in places), limits=LIMITS, longest=4.0)
+    with pytest.raises(LimitViolatedError, match="together with") as caught:
+        solve(task)
+    wider = {name: np.array(getattr(LIMITS, name), dtype=float) for name in ("speed", "acceleration", "jerk")}
+    for part in str(caught.value).split("the limits: ")[1].split("; ")[0].split(", together with "):
+        coordinate, kind = part.split()[:2]
+        wider[kind][LIMITS.names.index(coordinate)] = float(part.split(": ")[1].split()[0])
+    assert solve(Task(**{**vars(task), "limits": MotionLimits(**{**vars(LIMITS), **wider})})).cost <= 4.0
+    longer = float(str(caught.value).split("with the limits as they are, ")[1].split()[0])
+    assert solve(Task(**{**vars(task), "longest": longer})).cost <= longer
+
+
+def one(function, lower, upper, enclose=None):
+    """A quantity of one coordinate with the toolkit's own bounds."""
+    curves = [ca.SX.sym(n) for n in "xvaj"]
+    given = ca.Function("q", curves, [function(*curves)])
+    return Quantities(
+        function=given,
+        names=("push",),
+        units=("N",),
+        lower=np.array([lower]),
+        upper=np.array([upper]),
+        enclose=enclose or enclosure(given),
+    )
+
+
+AXIS = MotionLimits(position=(-10.0, 10.0), speed=1.0, acceleration=2.0, jerk=20.0, names=("a",))
+
+
+@pytest.mark.parametrize("share", [0.97, 0.8])
+@pytest.mark.parametrize("spans", [8, 24])
+def test_a_wider_limit_of_a_quantity_that_would_do_does(share, spans):
+    """Between the collocation points as well: it was tried before it was said."""
+    given = {"waypoints": (at(0.0), at(1.0)), "limits": AXIS, "spans": spans}
+    best = solve(Task(**given, quantities=one(lambda x, v, a, j: a, -1.5, 3.0))).cost
+    with pytest.raises(LimitViolatedError, match="push would be") as caught:
+        solve(Task(**given, quantities=one(lambda x, v, a, j: a, -1.5, 3.0), longest=share * best))
+    found = str(caught.value)
+    assert " would do" in found
+    wider = {"lower": -1.5, "jerk": 20.0, "acceleration": 2.0, "speed": 1.0, "upper": 3.0}
+    for part in found.split("the limits: ")[1].split("; ")[0].split(", together with "):
+        value = float(part.split(": ")[1].split()[0])
+        key = next(
+            (k for k in ("jerk", "acceleration", "speed") if part.startswith(f"a {k}")),
+            "upper" if " over " in part else "lower",
+        )
+        wider[key] = value
+    again = MotionLimits(**{**vars(AXIS), **{k: wider[k] for k in ("jerk", "acceleration", "speed")}})
+    task = Task(
+        **{**given, "limits": again},
+        quantities=one(lambda x, v, a, j: a, wider["lower"], wider["upper"]),
+        longest=share * best,
+    )
+    assert solve(task).cost <= share * best
+
+
+def test_a_limit_is_not_said_to_do_where_it_is_the_one_that_there_is():
+    limits = MotionLimits(position=(-10, 10), speed=1.0, acceleration=1e3, jerk=1e6, names=("a",))
+    with pytest.raises(LimitViolatedError) as caught:
+        solve(Task(waypoints=(at(0.0), at(1.0)), limits=limits, duration=1.05))
+    assert float(str(caught.value).split("% of the way: ")[1].split()[0]) > 1.0
+
+
+def test_the_quickest_motion_is_found_however_short():
+    """The guess is far longer, and so is the admissible time."""
+    tiny = Task(
+        waypoints=(at(0.0), at(1e-3)),
+        limits=MotionLimits(position=(-1, 1), names=("a",)),
+        quantities=one(lambda x, v, a, j: a, -2.0, 2.0),
+        rest=2,
+    )
+    found = [solve(Task(**{**vars(tiny), "longest": longest})).cost for longest in (1.0, 600.0)]
+    assert found[0] == pytest.approx(2 * (1e-3 / 2) ** 0.5, rel=0.06) and found[1] == pytest.approx(found[0], rel=1e-4)
+
+
+def test_a_later_begin_moves_the_knots_alone():
+    task = Task(
+        waypoints=(at(0.0), at(1e-4)),
+        limits=MotionLimits(position=(-1, 1), speed=1.0, acceleration=200.0, jerk=2e4, names=("a",)),
+    )
+    early, late = solve(task), solve(task, 1e6)
+    assert (early.spline.coefficients == late.spline.coefficients).all() and late.cost == early.cost
+    assert late.spline.start == 1e6 and late.arrivals[0] == pytest.approx(1e6 + early.arrivals[0])
+
+
+def test_an_absolute_value_is_bounded_without_its_slope():
+    task = Task(
+        waypoints=(at(0.0), at(1.0)),
+        limits=AXIS,
+        quantities=one(lambda x, v, a, j: ca.fabs(a) + 0.1 * ca.fabs(v), -1.0, 1.5),
+    )
+    motion = solve(task)
+    values = task.quantities.values(motion.spline, np.linspace(0, motion.spline.end, 5000))
+    assert values.max() <= motion.peaks.upper[0] <= 1.5 and values.max() > 1.4
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: one(lambda x, v, a, j: a, 1.0, 1.0), "lower limit below"),
+        (lambda: MotionLimits(position=(0, 1), speed=0.0), "a limit of speed is positive"),
+        (lambda: Cost(running=ca.Function("r", [ca.SX.sym(n) for n in "xvaj"], [1.0])), "a name and a weight"),
+        (lambda: Waypoint(value=np.zeros(2), through=tool()), "needs coordinates near it"),
+        (lambda: HalfSpace(name="w", normal=(0.0, 2.0), offset=1.0), "a normal has length 1"),
+        (lambda: Task(waypoints=(at(1.0), at(1.0)), limits=AXIS), "not to the same one"),
+        (lambda: Task(waypoints=(at(0.0), at(1.0)), limits=AXIS, duration=0.0), "duration is positive"),
+        (lambda: Task(waypoints=(at(0.0), at(1.0)), limits=AXIS, longest=np.inf), "finite time"),
+        (lambda: Task(waypoints=(at(0.0), at(1.0)), limits=AXIS, degree=3, spans=2), "control points for its rest"),
+        (lambda: jerk_limited([0.0], [0.0], AXIS), "two places"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_limits_of_quantities_cannot_be_changed_behind_a_cache():
+    with pytest.raises(ValueError, match="read-only"):
+        one(lambda x, v, a, j: a, 0.0, 1.0).upper[0] = 2.0
