@@ -16,7 +16,7 @@ from .enclosure import enclosure
 from .errors import InvalidInputError
 from .plants.crane import LIFT, TELESCOPE, TILT, tool
 from .plants.crane_dynamics import JOINTS, LIMITS, drives
-from .plants.pmsm_emla import defaults
+from .plants.pmsm_emla import PEAK_TORQUE, defaults
 
 #: Shortest lever arm of the actuators of lift and tilt that a motion may use, m/rad; assumed.
 LEAST_LEVER = 0.08
@@ -78,7 +78,7 @@ def running_costs(payload: float = 0.0) -> ca.Function:
     """Electrical power drawn, W, what is lost of it, W, and effort, the sum of squared shares of the torque limits."""
     w, v, a, j = symbols = [ca.SX.sym(name, 3) for name in "wvaj"]
     found = drives(w, v, a, j, payload)
-    effort = ca.sumsqr(found.torque / dict((name, limit) for name, _, limit in LIMITS)["motor torque"])
+    effort = ca.sumsqr(found.torque / PEAK_TORQUE)
     return ca.Function("costs", symbols, [ca.vertcat(ca.sum1(found.power), ca.sum1(found.loss), effort)])
 
 

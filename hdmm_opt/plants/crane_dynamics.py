@@ -143,7 +143,8 @@ class Drives:
         torque: Motor torques, N m.
         current: Motor currents, A, amplitude.
         voltage: Phase voltages, V, amplitude.
-        power: Electrical power drawn, W; negative where a motor feeds back.
+        power: Electrical power drawn, W, without what the inductances store and give back; negative where a motor
+            feeds back.
         loss: Power drawn that is not passed to the rod, W: copper, viscous friction, gear, screw and rod friction, and
             what speeds the rotors up, which a motion from rest to rest gives back.
     """
@@ -203,7 +204,7 @@ def drives(
 #: Largest force, motor speed, torque, current and voltage of an EMLA, with units.
 LIMITS = (
     ("force", "N", RATED_FORCE),
-    ("motor speed", "rad/s", MAXIMUM_SPEED / 0.016 * 2 * math.pi * 7.7),
+    ("motor speed", "rad/s", MAXIMUM_SPEED / defaults("voltage")["transmission"].value),
     ("motor torque", "N m", PEAK_TORQUE),
     ("current", "A", PEAK_CURRENT),
     ("voltage", "V", PHASE_VOLTAGE),
