@@ -140,6 +140,7 @@ def carried_out(job: Job, cost: Callable[[float], Any], name: str, **options: An
         options: Further entries of `trajectories.Task`.
 
     Raises:
+        InvalidInputError: a move that is none, such as one to the place where the crane is.
         LimitViolatedError: a move that no motion inside the limits makes; the message says which.
 
     Not guaranteed: that moves chosen one by one are best together.
@@ -161,5 +162,7 @@ def carried_out(job: Job, cost: Callable[[float], Any], name: str, **options: An
             motions.append(solve(task))
         except LimitViolatedError as error:
             raise LimitViolatedError(f"move {number}: {error}") from None
+        except ValueError as error:
+            raise InvalidInputError(f"move {number}: {error}; change the move") from None
         at = motions[-1].spline.coefficients[-1]
     return Motions(name=name, job=job, motions=tuple(motions))

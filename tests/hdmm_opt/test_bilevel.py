@@ -160,6 +160,8 @@ def test_what_cannot_be_done_names_the_move(tmp_path):
         Move()
     with pytest.raises(InvalidInputError, match="no places to pass"):
         bilevel(Job(start=START, moves=(Move(tool=PLACE, via=((3.0, 1.0),)),)), 2)
+    with pytest.raises(InvalidInputError, match="move 1: a motion goes from one place to another"):
+        bilevel(Job(start=START, moves=(Move(joints=START),)), 2)
     path = tmp_path / "mine.toml"
     path.write_text(FILE.replace("tool_m = [3.0, 2.2]", "tool_m = [9.0, 9.0]"))
     result = CliRunner().invoke(main, ["trajectory", str(path)])
