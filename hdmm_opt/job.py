@@ -14,9 +14,13 @@ from trajectories import LimitViolatedError, Motion, Obstacle, Task, Waypoint, s
 
 from .crane_task import COSTS, crane_task, joint_limits, running_costs, tool_function
 from .errors import InvalidInputError
-from .plants.crane import reach
+from .plants.crane import reach, tool
 
 Array = NDArray[np.float64]
+
+
+#: A tool nearer to its goal than this, m, is there.
+NOWHERE = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +134,11 @@ class Motions:
         return trapezoid(rates, t), trapezoid([np.where(power > 0, power - lost, 0.0), drawn], t)
 
 
+def _apart(at: Array, place: Sequence[float]) -> float:
+    """Distance of the tool from a place at joint coordinates, m."""
+    return float(np.hypot(*(np.array([float(x) for x in tool(at)]) - np.asarray(place))))
+
+
 def carried_out(job: Job, cost: Callable[[float], Any], name: str, **options: Any) -> Motions:
     """Each move by itself on one level: where the tool has a place, the joints share the way as costs least.
 
@@ -149,6 +158,8 @@ def carried_out(job: Job, cost: Callable[[float], Any], name: str, **options: An
     at = np.array(job.start)
     for number, move in enumerate(job.moves, 1):
         try:
+            if move.tool is not None and not move.via and _apart(at, move.tool) < NOWHERE:
+                raise ValueError(f"the tool goes from one place to another: it is at {list(move.tool)} m already")
             waypoints: list[Any] = [at]
             for place in move.via:
                 near = job.near(place, at if len(waypoints) == 1 else waypoints[-1].guess)

@@ -16,6 +16,7 @@ from hdmm_opt.errors import InvalidInputError
 from hdmm_opt.job import Job, Move
 from hdmm_opt.motion_file import document
 from hdmm_opt.motion_study import MotionStudy
+from hdmm_opt.plants.crane import tool as place
 from trajectories import LimitViolatedError, violations
 
 START, PLACE = (0.2, -1.2, 0.2), (3.0, 2.2)
@@ -162,6 +163,9 @@ def test_what_cannot_be_done_names_the_move(tmp_path):
         bilevel(Job(start=START, moves=(Move(tool=PLACE, via=((3.0, 1.0),)),)), 2)
     with pytest.raises(InvalidInputError, match="move 1: a motion goes from one place to another"):
         bilevel(Job(start=START, moves=(Move(joints=START),)), 2)
+    here = (float(place(START)[0]), float(place(START)[1]))
+    with pytest.raises(InvalidInputError, match="move 1: the tool goes from one place to another"):
+        bilevel(Job(start=START, moves=(Move(tool=here),)), 2)
     path = tmp_path / "mine.toml"
     path.write_text(FILE.replace("tool_m = [3.0, 2.2]", "tool_m = [9.0, 9.0]"))
     result = CliRunner().invoke(main, ["trajectory", str(path)])
