@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from trajectories import LimitViolatedError, Motion, solve
 
-from .crane_task import crane_cost, joint_limits
+from .crane_task import crane_cost
 from .errors import InvalidInputError
 from .job import Job, Motions, carried_out
 from .plants.crane import reach
@@ -84,7 +84,7 @@ class _Leader:
 
     def __init__(self, job: Job, start: Motions, tick: Callable[[int, float], None] | None) -> None:
         self.job, self.start, self.tick = job, start, tick
-        self.reach = float(joint_limits(job.least_lever).room[1][2])
+        self.reach = float(job.limits.room[1][2])
         self.history: list[float] = []
         self.best, self.found = np.inf, None
 
@@ -139,7 +139,7 @@ class _Leader:
     def place(self, tool: Sequence[float], extension: float, led: Motion) -> Array:
         """Joint coordinates at a place of the tool with an extension, near those the leader started from."""
         found = reach(tool, float(extension), led.spline.coefficients[-1])
-        if found is None or not self.job.inside(found):
+        if found is None or not self.job.limits.holds(found):
             raise LimitViolatedError(
                 f"the tool cannot reach ({tool[0]:g}, {tool[1]:g}) m with an extension of {extension:.4g} m"
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -41,6 +41,7 @@ def joint_limits(least_lever: float = LEAST_LEVER) -> MotionLimits:
     )  # fmt: skip
 
 
+@cache
 def tool_function() -> ca.Function:
     """Place of the tool in the plane of the crane, m, at joint coordinates. Shapes (3,) -> (2,)."""
     w = ca.SX.sym("w", 3)
@@ -62,13 +63,12 @@ def drive_quantities(payload: float = 0.0, obstacles: tuple[Obstacle, ...] = ())
     column = ca.Function("drives", symbols, [ca.densify(ca.vertcat(*columns, *clear))])
     names = [f"{joint} {name}" for name, _, _ in LIMITS for joint in JOINTS]
     sizes = np.repeat([limit for _, _, limit in LIMITS], len(JOINTS))
-    free = np.full(len(obstacles), np.inf)
     return Quantities(
         function=column,
         names=(*names, *(f"clearance of {obstacle.name}" for obstacle in obstacles)),
         units=(*(unit for _, unit, _ in LIMITS for _ in JOINTS), *("m" for _ in obstacles)),
         lower=np.concatenate([-sizes, np.zeros(len(obstacles))]),
-        upper=np.concatenate([sizes, free]),
+        upper=np.concatenate([sizes, np.full(len(obstacles), np.inf)]),
         enclose=enclosure(column),
     )
 

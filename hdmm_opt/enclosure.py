@@ -61,14 +61,14 @@ def _batches(count: int) -> list[slice]:
 
 def _bound(here: Expression, rate: Expression | None, names: tuple[str, ...], pieces: Pieces) -> tuple[Array, Array]:
     # the whole piece and its middle in one evaluation
-    ranges = zip(pieces.ranges(), pieces.middles(), strict=True)
-    ends = tuple(np.concatenate(both, axis=2) for both in ranges)
+    ranges = pieces.ranges()
+    ends = (np.concatenate(both, axis=2) for both in zip(ranges, pieces.middles(), strict=True))
     (low, point_low), (high, point_high) = (
         np.split(end, 2, axis=1) for end in enclose_many(here, _named(names, *ends))
     )
     if rate is None:
         return low, high
-    slope = np.maximum(*(np.abs(end) for end in enclose_many(rate, _named(names, *pieces.ranges()))))
+    slope = np.maximum(*(np.abs(end) for end in enclose_many(rate, _named(names, *ranges))))
     with np.errstate(invalid="ignore"):
         reach = np.nextafter(slope * np.nextafter(pieces.width / 2, np.inf), np.inf)
         below, above = np.nextafter(point_low - reach, -np.inf), np.nextafter(point_high + reach, np.inf)

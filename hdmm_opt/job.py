@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trajectories import LimitViolatedError, Motion, Obstacle, Task, Waypoint, solve
+from trajectories import LimitViolatedError, Motion, MotionLimits, Obstacle, Task, Waypoint, solve
 
-from .crane_task import COSTS, crane_task, joint_limits, running_costs, tool_function
+from .crane_task import COSTS, LEAST_LEVER, crane_task, joint_limits, running_costs, tool_function
 from .errors import InvalidInputError
-from .plants.crane import reach, tool
+from .plants.crane import apart, reach
 
 Array = NDArray[np.float64]
-
 
 #: A tool nearer to its goal than this, m, is there.
 NOWHERE = 1e-6
@@ -60,17 +59,16 @@ class Job:
     moves: tuple[Move, ...]
     obstacles: tuple[Obstacle, ...] = ()
     longest: float = 60.0
-    least_lever: float = 0.08
+    least_lever: float = LEAST_LEVER
 
     def task(self, waypoints: Sequence[Any], payload: float, **options: Any) -> Task:
         """A move of the job as a task."""
-        limits = joint_limits(self.least_lever)
-        return crane_task(waypoints, payload=payload, obstacles=self.obstacles, limits=limits, **options)
+        return crane_task(waypoints, payload=payload, obstacles=self.obstacles, limits=self.limits, **options)
 
-    def inside(self, w: Array | None) -> bool:
-        """Whether joint coordinates are inside the ranges of the job; None is not."""
-        low, high = joint_limits(self.least_lever).room
-        return w is not None and bool((w >= low).all() and (w <= high).all())
+    @cached_property
+    def limits(self) -> MotionLimits:
+        """Limits of the joints."""
+        return joint_limits(self.least_lever)
 
     def near(self, place: Sequence[float], at: Array) -> Array:
         """Joint coordinates at a place of the tool, the nearest to given ones of a few extensions.
@@ -78,9 +76,9 @@ class Job:
         Raises:
             LimitViolatedError: the tool cannot reach the place.
         """
-        longest = joint_limits(self.least_lever).room[1][2]
+        longest = self.limits.room[1][2]
         tried = [reach(place, float(share * longest), at) for share in np.linspace(0.1, 0.9, 9)]
-        found = [w for w in tried if w is not None and self.inside(w)]
+        found = [w for w in tried if w is not None and self.limits.holds(w)]
         if not found:
             raise LimitViolatedError(f"the tool cannot reach ({place[0]:g}, {place[1]:g}) m; move the place")
         return min(found, key=lambda w: float(np.abs(w - at).max()))
@@ -108,35 +106,27 @@ class Motions:
     @cached_property
     def totals(self) -> dict[str, float]:
         """Integrals of electrical power, J, of what is lost of it, J, and of effort, s, over all moves."""
-        values = [
-            self._integrals(motion, move.payload)[0] for motion, move in zip(self.motions, self.job.moves, strict=True)
-        ]
-        return dict(zip(COSTS, np.sum(values, axis=0).tolist(), strict=True))
+        return dict(zip(COSTS, self._integrals[: len(COSTS)].tolist(), strict=True))
 
     @cached_property
     def efficiency(self) -> float:
         """Work that leaves the rods while the motors draw power, over the energy drawn then."""
-        both = [
-            self._integrals(motion, move.payload)[1] for motion, move in zip(self.motions, self.job.moves, strict=True)
-        ]
-        useful, drawn = np.sum(both, axis=0)
+        useful, drawn = self._integrals[len(COSTS) :]
         return float(useful / drawn)
 
-    @staticmethod
-    def _integrals(motion: Motion, payload: float) -> tuple[Array, Array]:
-        """Integrals of the running costs; of the power at the rods and of that drawn, where it is drawn."""
+    @cached_property
+    def _integrals(self) -> Array:
+        """Over all moves: the running costs, the power at the rods and that drawn, both where it is drawn."""
         from scipy.integrate import trapezoid
 
-        t = np.linspace(motion.spline.start, motion.spline.end, 4001)
-        rates = np.array(running_costs(payload).map(len(t))(*(motion.spline(t, order).T for order in range(4))))
-        power, lost, _ = rates
-        drawn = np.maximum(power, 0.0)
-        return trapezoid(rates, t), trapezoid([np.where(power > 0, power - lost, 0.0), drawn], t)
-
-
-def _apart(at: Array, place: Sequence[float]) -> float:
-    """Distance of the tool from a place at joint coordinates, m."""
-    return float(np.hypot(*(np.array([float(x) for x in tool(at)]) - np.asarray(place))))
+        parts = []
+        for motion, move in zip(self.motions, self.job.moves, strict=True):
+            t = np.linspace(motion.spline.start, motion.spline.end, 4001)
+            curves = (motion.spline(t, order).T for order in range(4))
+            power, lost, effort = np.array(running_costs(move.payload).map(len(t))(*curves))
+            useful = np.where(power > 0, power - lost, 0.0)
+            parts.append(trapezoid([power, lost, effort, useful, np.maximum(power, 0.0)], t))
+        return np.sum(parts, axis=0)
 
 
 def carried_out(job: Job, cost: Callable[[float], Any], name: str, **options: Any) -> Motions:
@@ -158,7 +148,7 @@ def carried_out(job: Job, cost: Callable[[float], Any], name: str, **options: An
     at = np.array(job.start)
     for number, move in enumerate(job.moves, 1):
         try:
-            if move.tool is not None and not move.via and _apart(at, move.tool) < NOWHERE:
+            if move.tool is not None and not move.via and apart(at, move.tool) < NOWHERE:
                 raise ValueError(f"the tool goes from one place to another: it is at {list(move.tool)} m already")
             waypoints: list[Any] = [at]
             for place in move.via:

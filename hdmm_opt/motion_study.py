@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from trajectories import Ball, HalfSpace, Obstacle
 
-from .crane_task import COSTS, joint_limits
+from .crane_task import COSTS, LEAST_LEVER, joint_limits
 from .job import Job, Move
 from .plants.crane_dynamics import JOINTS
 from .study import NonNegative, Pair, Positive, Section, StudySection
@@ -20,7 +20,7 @@ class CraneSection(Section):
     """The crane; its geometry, masses and drives are those of `plants/crane*.py`."""
 
     model: Literal["crane"]
-    least_lever_m_rad: Annotated[float, Field(gt=0, le=0.25)] = 0.08
+    least_lever_m_rad: Annotated[float, Field(gt=0, le=0.25)] = LEAST_LEVER
 
 
 class MoveSection(Section):

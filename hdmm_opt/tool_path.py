@@ -12,12 +12,13 @@ import casadi as ca
 import numpy as np
 
 from trajectories import Guess, MotionLimits, Path, Quantities, Task, Waypoint
-from trajectories.spline import clamped_knots, fitted
+from trajectories.guess import fitted_controls, unit_times
+from trajectories.quintic import law
 
 from .crane_task import drive_quantities, joint_limits
 from .enclosure import enclosure
 from .errors import InvalidInputError
-from .plants.crane import reach, tool
+from .plants.crane import apart, reach, tool
 
 
 def tool_path_task(
@@ -42,7 +43,7 @@ def tool_path_task(
     if not tolerance > 0:
         raise InvalidInputError(f"a path is followed within a positive tolerance: got {tolerance:g} m; widen it")
     first = np.asarray(start, dtype=float)
-    off = float(np.hypot(*(np.array([float(x) for x in tool(first)]) - path([0.0])[0])))
+    off = apart(first, path([0.0])[0])
     if not off <= tolerance:
         raise InvalidInputError(
             f"the tool starts on its path: got {off:.4g} m beside it, the tolerance is {tolerance:g} m; "
@@ -70,12 +71,12 @@ def tool_path_task(
 
 def _along(path: Path, first: np.ndarray) -> np.ndarray:
     """Joint coordinates on the path with the extension of the start. Shape (points, 3)."""
-    low, high = joint_limits().room
+    joints = joint_limits()
     found = [first]
     for s in np.linspace(0.0, 1.0, 101)[1:]:
         place = path([s])[0]
         w = reach(place, float(first[2]), found[-1])
-        if w is None or (w < low).any() or (w > high).any():
+        if w is None or not joints.holds(w):
             raise InvalidInputError(
                 f"the tool reaches its path with the extension of the start, {first[2]:g} m: it cannot at "
                 f"({place[0]:.4g}, {place[1]:.4g}) m, {100 * s:.0f} % of it; "
@@ -105,12 +106,10 @@ def _quantities(path: Path, tolerance: float, payload: float) -> Quantities:
 
 def _guess(task: Task, places: np.ndarray) -> Guess:
     """Along the places with a quintic law, in the time that the limits of the joints take for the whole way."""
-    unit = np.linspace(0.0, 1.0, 8 * (task.spans + task.degree))
-    law = 10 * unit**3 - 15 * unit**4 + 6 * unit**5
+    done = law(unit_times(task))
     shares = np.linspace(0.0, 1.0, len(places))
-    values = np.stack([np.interp(law, shares, column) for column in places.T] + [law], axis=1)
-    knots = clamped_knots(0.0, 1.0, task.spans, task.degree)
+    values = np.stack([np.interp(done, shares, column) for column in places.T] + [done], axis=1)
     way = np.abs(np.diff(places, axis=0)).sum(axis=0)
     duration = 3.0 * float((way / task.limits.of(1)[:3]).max()) + 1.0
-    points = np.clip(fitted(unit, values, knots, task.degree).coefficients, *task.limits.room)
-    return Guess(points=(points,), durations=np.array([task.duration or min(duration, task.longest)]))
+    duration = min(duration, task.longest) if task.duration is None else task.duration
+    return Guess(points=(fitted_controls(task, values),), durations=np.array([duration]))

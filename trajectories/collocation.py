@@ -82,13 +82,13 @@ def solve(task: Task, begin: float = 0.0, guess: Guess | None = None) -> Motion:
     curve, which falls with the square of the number of spans.
     """
     _reject_places(task)
-    given = [guess] if guess is not None else list(guesses(task))
-    first = _Attempt(task, given[0])
+    starts = guesses(task) if guess is None else iter([guess])
+    first = _Attempt(task, next(starts))
     motion, relaxation = first.run(), None
     if motion is None:
-        relaxation = relaxed(task, given[0])
+        relaxation = relaxed(task, first.start)
         known = [] if relaxation is None or relaxation.widened else [relaxation.guess]
-        tried = (_Attempt(task, start).run() for start in [*known, *given[1:]])
+        tried = (_Attempt(task, start).run() for start in (*known, *starts))
         motion = next((found for found in tried if found is not None), None)
     if motion is None:
         raise refusal(task, _reasons(task, relaxation), first.failure, _shortest(task))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .limits import ORDERS
-from .quintic import shortest_duration
+from .quintic import law, shortest_duration
 from .spline import clamped_knots, fitted
 from .task import Task
 
@@ -36,6 +37,17 @@ class Guess:
     durations: Array
 
 
+def unit_times(task: Task) -> Array:
+    """Shares of a phase's time at which a guess is sampled. Shape (m,)."""
+    return np.linspace(0.0, 1.0, 8 * (task.spans + task.degree))
+
+
+def fitted_controls(task: Task, values: Array) -> Array:
+    """Control points of a phase, inside the ranges of the coordinates, from samples at `unit_times`, shape (m, n)."""
+    knots = clamped_knots(0.0, 1.0, task.spans, task.degree)
+    return np.clip(fitted(unit_times(task), values, knots, task.degree).coefficients, *task.limits.room)
+
+
 def guesses(task: Task) -> Iterator[Guess]:
     """Moves along straight lines between the waypoints, then along bent ones."""
     for bend in BENDS:
@@ -50,16 +62,14 @@ def straight(task: Task, bend: float = 0.0) -> Guess:
         bend: How far the middle leaves the line, as a share of the room to the limits of each coordinate.
     """
     low, high = task.limits.room
-    s = np.linspace(0.0, 1.0, 8 * (task.spans + task.degree))
-    law = (10 * s**3 - 15 * s**4 + 6 * s**5)[:, None]
-    knots = clamped_knots(0.0, 1.0, task.spans, task.degree)
+    way = law(unit_times(task))[:, None]
     points, durations = [], []
-    for before, after in zip(task.waypoints, task.waypoints[1:], strict=False):
-        line = before.guess + law * (after.guess - before.guess)
+    for before, after in pairwise(task.waypoints):
+        line = before.guess + way * (after.guess - before.guess)
         edge = np.where(bend > 0, high, low)
         edge = np.where(np.isfinite(edge), edge, line)
-        path = line + abs(bend) * 4 * law * (1 - law) * (edge - line)
-        points.append(np.clip(fitted(s, path, knots, task.degree).coefficients, low, high))
+        path = line + abs(bend) * 4 * way * (1 - way) * (edge - line)
+        points.append(fitted_controls(task, path))
         durations.append(_duration(task, after.guess - before.guess))
     share = task.duration / sum(durations) if task.duration is not None else min(1.0, task.longest / sum(durations))
     return Guess(points=tuple(points), durations=share * np.array(durations))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -55,7 +56,7 @@ def jerk_limited(start: ArrayLike, goal: ArrayLike, limits: MotionLimits, begin:
     coefficients[-3:] = last  # at rest there, up to the rounding of the integration
     knots = begin + np.concatenate([np.zeros(3), times, np.full(3, duration)])
     spline = Spline(knots=knots, coefficients=coefficients)
-    free = MotionLimits(**{**vars(limits), "position": (-np.inf, np.inf)})
+    free = replace(limits, position=(-np.inf, np.inf))
     broken = violations(spline, free)
     if broken:
         raise LimitViolatedError(f"{broken[0]}: phases of the move are too short for its control points; use `solve`")

@@ -58,6 +58,11 @@ class MotionLimits:
         low, high = (np.broadcast_to(np.asarray(end, dtype=float), len(self.names)) for end in self.position)
         return low, high
 
+    def holds(self, place: Array) -> bool:
+        """Whether a place, shape (n,), is inside the ranges of the coordinates."""
+        low, high = self.room
+        return bool((place >= low).all() and (place <= high).all())
+
     def title(self, order: int, index: int) -> str:
         """What a limit is called, such as "lift speed"."""
         return f"{self.names[index]} {ORDERS[order]}".strip()

@@ -156,10 +156,7 @@ def _selection(task: Task, shape: Shape, local: Array, orders: int) -> Any:
 
 def spread_jacobian(nodes: Nodes, w: Any) -> Any:
     """Jacobian of the node rows by the variables: each entry of the small one times a row of the selection."""
-    pattern = nodes.node.jacobian.sparsity_out(0)
-    row, column = (np.array(part, dtype=np.int64) for part in pattern.get_triplet())
-    own = np.arange(nodes.count)[:, None]
-    rows, columns = (own * nodes.rows + row).ravel(), (own * nodes.width + column).ravel()
+    rows, columns = _entries(nodes.node.jacobian, nodes.count)
     entry, place, value = _expanded(nodes.select, columns)
     sparse = nodes.node.jacobian.map(nodes.count)(w)
     shape = (nodes.rows * nodes.count, nodes.select.shape[1])
@@ -168,16 +165,20 @@ def spread_jacobian(nodes: Nodes, w: Any) -> Any:
 
 def spread_hessian(nodes: Nodes, curved: Any) -> Any:
     """Upper triangle of the node Hessians by the variables."""
-    pattern = nodes.node.hessian.sparsity_out(0)
-    row, column = (np.array(part, dtype=np.int64) for part in pattern.get_triplet())
-    own = np.arange(nodes.count)[:, None]
-    rows, columns = (own * nodes.width + row).ravel(), (own * nodes.width + column).ravel()
+    rows, columns = _entries(nodes.node.hessian, nodes.count)
     entry, first, value = _expanded(nodes.select, rows)
     again, second, factor = _expanded(nodes.select, columns[entry])
     entry, first, value = entry[again], first[again], value[again] * factor
     upper = first <= second
     size = nodes.select.shape[1]
     return _scattered(curved, first[upper], second[upper], entry[upper], value[upper], (size, size))
+
+
+def _entries(function: Any, count: int) -> tuple[Indices, Indices]:
+    """Rows and columns of the nonzeros of a function's output, as blocks of a diagonal of so many."""
+    row, column = (np.array(part, dtype=np.int64) for part in function.sparsity_out(0).get_triplet())
+    own = np.arange(count)[:, None]
+    return (own * function.size1_out(0) + row).ravel(), (own * function.size2_out(0) + column).ravel()
 
 
 def _expanded(select: Any, rows: Indices) -> tuple[Indices, Indices, Array]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import comb
 from typing import Any
 
@@ -27,6 +28,7 @@ class Path:
 
     function: Any
 
+    @cached_property
     def derivatives(self) -> Any:
         """CasADi function s -> (r, r', r'', r''')."""
         import casadi as ca
@@ -40,7 +42,7 @@ class Path:
     def __call__(self, s: ArrayLike, order: int = 0) -> Array:
         """Values of a derivative. Shape (len(s), n)."""
         points = np.atleast_1d(np.asarray(s, dtype=float))
-        return np.array(self.derivatives().map(len(points))(points[None, :])[order]).T
+        return np.array(self.derivatives.map(len(points))(points[None, :])[order]).T
 
 
 def bezier(points: ArrayLike) -> Path:
@@ -63,7 +65,7 @@ def bezier(points: ArrayLike) -> Path:
 
 def composed(path: Path, curves: list[Any]) -> list[Any]:
     """Position … jerk along a path from those of the path coordinate (the chain rule)."""
-    r, r1, r2, r3 = path.derivatives()(curves[0])
+    r, r1, r2, r3 = path.derivatives(curves[0])
     _, ds, dds, ddds = curves
     return [r, r1 * ds, r2 * ds**2 + r1 * dds, r3 * ds**3 + 3 * r2 * ds * dds + r1 * ddds]
 

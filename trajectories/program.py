@@ -23,11 +23,11 @@ from .task import Limit, Task
 Array = NDArray[np.float64]
 
 
-def derivative_matrices(spans: int, degree: int, orders: int = 4) -> list[Array]:
-    """Maps from control points to the control points of the derivatives 0 … orders - 1, on unit time."""
+def derivative_matrices(spans: int, degree: int) -> list[Array]:
+    """Maps from control points to the control points of position … jerk, on unit time."""
     knots = clamped_knots(0.0, 1.0, spans, degree)
     unit = Spline(knots=knots, coefficients=np.eye(len(knots) - degree - 1))
-    return [unit.derivative_points(order)[1] for order in range(min(orders, degree + 1))]
+    return [unit.derivative_points(order)[1] for order in range(min(4, degree + 1))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,6 @@ class Program:
         upper: Upper bounds of the rows.
         limits: What each slack of the relaxed program widens.
         nodes: Number of collocation points.
-        scale: Factor on the cost.
     """
 
     shape: Shape
@@ -50,7 +49,6 @@ class Program:
     upper: Array
     limits: tuple[Limit, ...]
     nodes: int
-    scale: float
 
 
 def build(task: Task, scale: float, *, relaxed: bool = False) -> Program:
@@ -79,7 +77,6 @@ def build(task: Task, scale: float, *, relaxed: bool = False) -> Program:
         upper=np.concatenate([high, np.tile(nodes.node.upper, nodes.count)]),
         limits=limits,
         nodes=nodes.count,
-        scale=scale,
     )
 
 
@@ -194,8 +191,8 @@ def _derivatives(x: Any, rows: Any, cost: Any) -> dict[str, Any]:
     hessian = ca.triu(ca.hessian(factor * cost + ca.dot(weight, rows), x)[0])
     return {
         "value": ca.Function("smooth", [x], [cost, rows]),
-        "gradient": ca.Function("smooth_gradient", [x], [cost, ca.gradient(cost, x)]),
-        "jacobian": ca.Function("smooth_jacobian", [x], [rows, ca.jacobian(rows, x)]),
+        "gradient": ca.Function("smooth_gradient", [x], [ca.gradient(cost, x)]),
+        "jacobian": ca.Function("smooth_jacobian", [x], [ca.jacobian(rows, x)]),
         "hessian": ca.Function("smooth_hessian", [x, factor, weight], [hessian]),
     }
 
@@ -206,8 +203,7 @@ def _assembled(size: int, scale: float, smooth: dict[str, Any], nodes: Nodes) ->
 
     x, factor = ca.MX.sym("x", size), ca.MX.sym("s")
     cost, rows = smooth["value"](x)
-    _, gradient = smooth["gradient"](x)
-    jacobian = smooth["jacobian"](x)[1]
+    gradient, jacobian = smooth["gradient"](x), smooth["jacobian"](x)
     weight = ca.MX.sym("l", rows.numel() + nodes.rows * nodes.count)
     hessian = smooth["hessian"](x, factor, weight[: rows.numel()])
     select = casadi_matrix(nodes.select)

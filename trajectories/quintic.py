@@ -6,8 +6,11 @@ from itertools import combinations
 from math import comb, prod
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .spline import DEGREE, Spline, clamped_knots
+
+Array = NDArray[np.float64]
 
 #: Spans of the spline that carries a quintic; the control points then bound its acceleration within 1 %.
 SPANS = 24
@@ -41,6 +44,11 @@ def quintic(start: float, goal: float, begin: float, duration: float) -> Spline:
     coefficients[-3:] = goal
     times = begin + duration * knots
     return Spline(knots=times, coefficients=coefficients)
+
+
+def law(share: Array) -> Array:
+    """Share of the way at a share of the time. Any shape."""
+    return 10 * share**3 - 15 * share**4 + 6 * share**5
 
 
 def _blossom(arguments: tuple[float, ...]) -> float:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .guess import Guess
+from .guess import Guess, fitted_controls, unit_times
 from .limits import LimitViolatedError, MotionLimits
 from .path import Path, along
 from .quantity import Enclosure, Peaks, Quantities, peaks
-from .spline import Spline, clamped_knots, fitted
+from .spline import Spline
 from .task import Task
 
 Array = NDArray[np.float64]
@@ -78,10 +78,7 @@ def retime(
     Not guaranteed: TOPP-RA is optimal on its grid; between grid points s'' is constant. Positions are those of the path
     and are not checked against `limits`.
     """
-    free = MotionLimits(
-        position=limits.position, speed=limits.speed, acceleration=limits.acceleration, names=limits.names,
-        units=limits.units,
-    )  # fmt: skip
+    free = replace(limits, jerk=np.inf)
     checked = along(path, free, quantities, enclose)
     share = 1.0
     for _ in range(ROUNDS):
@@ -118,16 +115,14 @@ def law_guess(retimed: Retimed, task: Task, room: float = 1.02) -> Guess:
 
 
 def _times(retimed: Retimed, task: Task) -> Array:
-    return np.linspace(retimed.law.start, retimed.law.end, 8 * (task.spans + task.degree))
+    return retimed.law.start + retimed.duration * unit_times(task)
 
 
 def _sampled(task: Task, values: Array, duration: float) -> Guess:
-    unit = np.linspace(0.0, 1.0, len(values))
-    knots = clamped_knots(0.0, 1.0, task.spans, task.degree)
-    points = fitted(unit, values, knots, task.degree).coefficients
+    points = fitted_controls(task, values)
     for end, own in ((slice(0, task.rest), values[0]), (slice(-task.rest, None), values[-1])):
-        points[end] = own
-    return Guess(points=(np.clip(points, *task.limits.room),), durations=np.array([duration]))
+        points[end] = np.clip(own, *task.limits.room)
+    return Guess(points=(points,), durations=np.array([duration]))
 
 
 def _law(path: Path, limits: MotionLimits, quantities: Quantities | None, grid: int, share: float) -> Spline:
@@ -207,14 +202,12 @@ def _uncontrollable(algorithm: Any, path: Path, quantities: Quantities | None, p
     if quantities is None:
         return message + "; raise the limits of acceleration there"
     still = np.zeros(path(np.array([at])).shape[1])
-    shares = []
     for s in (at, *points):
         values = np.array(quantities.function(path([s])[0], still, still, still)).ravel()
         outside = np.maximum(values - quantities.upper, quantities.lower - values) / quantities.scale
-        shares.append((float(outside.max()), int(outside.argmax()), s, values))
-        if shares[-1][0] > 0:
-            worst, value = shares[-1][1], shares[-1][3][shares[-1][1]]
-            name, unit = quantities.names[worst], quantities.units[worst]
+        worst = int(outside.argmax())
+        if outside[worst] > 0:
+            name, unit, value = quantities.names[worst], quantities.units[worst], values[worst]
             limit = quantities.upper[worst] if value > quantities.upper[worst] else quantities.lower[worst]
             return (
                 f"{message}; at rest at {100 * s:.0f} % of it {name} is {value:.5g} {unit}, its limit "

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InvalidInputError
@@ -117,6 +118,11 @@ def tool(w: Any) -> tuple[Any, Any]:
     return across, up
 
 
+def apart(w: Any, place: Sequence[float]) -> float:
+    """Distance of the tool from a place at joint coordinates, m."""
+    return math.hypot(*(float(is_at) - float(there) for is_at, there in zip(tool(w), place, strict=True)))
+
+
 def reach(place: Sequence[float], extension: float, near: Any) -> NDArray[np.float64] | None:
     """Joint coordinates at which the tool is at a place, with a given extension of the telescope.
 
@@ -129,18 +135,23 @@ def reach(place: Sequence[float], extension: float, near: Any) -> NDArray[np.flo
         Coordinates, shape (3,), whether or not they are inside the ranges of the joints; None where the method does
         not converge.
     """
-    import casadi as ca
     import numpy as np
 
-    w = ca.SX.sym("w", 2)
-    across, up = tool(ca.vertcat(w, extension))
-    residual = ca.vertcat(across - place[0], up - place[1])
-    step = ca.Function("step", [w], [residual, ca.jacobian(residual, w)])
     angles = np.array(near[:2], dtype=float)
     for _ in range(50):
-        value, slope = (np.array(part) for part in step(angles))
+        value, slope = (np.array(part) for part in _step()(angles, extension, [*place]))
         if np.abs(value).max() < 1e-12:
             return np.append(angles, extension)
         change = np.linalg.lstsq(slope, value, rcond=None)[0].ravel()
         angles = angles - change * min(1.0, 0.5 / max(np.abs(change).max(), 1e-12))
     return None
+
+
+@cache
+def _step() -> Any:
+    """CasADi function of the two angles, the extension and a place: how far the tool is off, and its Jacobian."""
+    import casadi as ca
+
+    w, extension, place = ca.SX.sym("w", 2), ca.SX.sym("w3"), ca.SX.sym("place", 2)
+    residual = ca.vertcat(*tool(ca.vertcat(w, extension))) - place
+    return ca.Function("step", [w, extension, place], [residual, ca.jacobian(residual, w)])

@@ -83,9 +83,9 @@ def _actuator_bodies(w: Any, v: Any, a: Any) -> Any:
     torques, gain = ca.SX.zeros(3), ca.SX.sym("a", 3)
     gravity = ca.DM([GRAVITY[0], GRAVITY[2]])
     for loop, parent, joint in ((LIFT, -1, BASE), (TILT, 0, ELBOW)):
-        for name, place, turning in _members(loop, parent, joint, q):
+        for name, place, turned in _members(loop, parent, joint, q):
             body = bodies_of_crane()[name]
-            moved, turned = ca.jacobian(place, q), turning
+            moved = ca.jacobian(place, q)
             centre = float(body.moment[0]) / body.mass
             acceleration = moved @ gain + ca.jtimes(moved @ rate, q, rate)
             spin = turned @ gain + ca.jtimes(turned @ rate, q, rate)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pushes import push
 
-from hdmm_opt.enclosure import enclosure
 from trajectories import (
     Ball,
     Cost,
@@ -245,20 +245,6 @@ def test_several_limits_that_are_in_the_way_would_do_together():
     assert solve(Task(**{**vars(task), "longest": longer})).cost <= longer
 
 
-def one(function, lower, upper, enclose=None):
-    """A quantity of one coordinate with the toolkit's own bounds."""
-    curves = [ca.SX.sym(n) for n in "xvaj"]
-    given = ca.Function("q", curves, [function(*curves)])
-    return Quantities(
-        function=given,
-        names=("push",),
-        units=("N",),
-        lower=np.array([lower]),
-        upper=np.array([upper]),
-        enclose=enclose or enclosure(given),
-    )
-
-
 AXIS = MotionLimits(position=(-10.0, 10.0), speed=1.0, acceleration=2.0, jerk=20.0, names=("a",))
 
 
@@ -267,9 +253,9 @@ AXIS = MotionLimits(position=(-10.0, 10.0), speed=1.0, acceleration=2.0, jerk=20
 def test_a_wider_limit_of_a_quantity_that_would_do_does(share, spans):
     """Between the collocation points as well: it was tried before it was said."""
     given = {"waypoints": (at(0.0), at(1.0)), "limits": AXIS, "spans": spans}
-    best = solve(Task(**given, quantities=one(lambda x, v, a, j: a, -1.5, 3.0))).cost
+    best = solve(Task(**given, quantities=push(lambda x, v, a, j: a, -1.5, 3.0))).cost
     with pytest.raises(LimitViolatedError, match="push would be") as caught:
-        solve(Task(**given, quantities=one(lambda x, v, a, j: a, -1.5, 3.0), longest=share * best))
+        solve(Task(**given, quantities=push(lambda x, v, a, j: a, -1.5, 3.0), longest=share * best))
     found = str(caught.value)
     assert " would do" in found
     wider = {"lower": -1.5, "jerk": 20.0, "acceleration": 2.0, "speed": 1.0, "upper": 3.0}
@@ -283,7 +269,7 @@ def test_a_wider_limit_of_a_quantity_that_would_do_does(share, spans):
     again = MotionLimits(**{**vars(AXIS), **{k: wider[k] for k in ("jerk", "acceleration", "speed")}})
     task = Task(
         **{**given, "limits": again},
-        quantities=one(lambda x, v, a, j: a, wider["lower"], wider["upper"]),
+        quantities=push(lambda x, v, a, j: a, wider["lower"], wider["upper"]),
         longest=share * best,
     )
     assert solve(task).cost <= share * best
@@ -301,7 +287,7 @@ def test_the_quickest_motion_is_found_however_short():
     tiny = Task(
         waypoints=(at(0.0), at(1e-3)),
         limits=MotionLimits(position=(-1, 1), names=("a",)),
-        quantities=one(lambda x, v, a, j: a, -2.0, 2.0),
+        quantities=push(lambda x, v, a, j: a, -2.0, 2.0),
         rest=2,
     )
     found = [solve(Task(**{**vars(tiny), "longest": longest})).cost for longest in (1.0, 600.0)]
@@ -322,7 +308,7 @@ def test_an_absolute_value_is_bounded_without_its_slope():
     task = Task(
         waypoints=(at(0.0), at(1.0)),
         limits=AXIS,
-        quantities=one(lambda x, v, a, j: ca.fabs(a) + 0.1 * ca.fabs(v), -1.0, 1.5),
+        quantities=push(lambda x, v, a, j: ca.fabs(a) + 0.1 * ca.fabs(v), -1.0, 1.5),
     )
     motion = solve(task)
     values = task.quantities.values(motion.spline, np.linspace(0, motion.spline.end, 5000))
@@ -332,7 +318,7 @@ def test_an_absolute_value_is_bounded_without_its_slope():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: one(lambda x, v, a, j: a, 1.0, 1.0), "lower limit below"),
+        (lambda: push(lambda x, v, a, j: a, 1.0, 1.0), "lower limit below"),
         (lambda: MotionLimits(position=(0, 1), speed=0.0), "a limit of speed is positive"),
         (lambda: Cost(running=ca.Function("r", [ca.SX.sym(n) for n in "xvaj"], [1.0])), "a name and a weight"),
         (lambda: Waypoint(value=np.zeros(2), through=tool()), "needs coordinates near it"),
@@ -351,4 +337,4 @@ def test_what_makes_no_sense_is_refused(make, message):
 
 def test_limits_of_quantities_cannot_be_changed_behind_a_cache():
     with pytest.raises(ValueError, match="read-only"):
-        one(lambda x, v, a, j: a, 0.0, 1.0).upper[0] = 2.0
+        push(lambda x, v, a, j: a, 0.0, 1.0).upper[0] = 2.0

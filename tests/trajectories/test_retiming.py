@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from pushes import push
 
 from hdmm_opt.enclosure import enclosure
 from trajectories import (
@@ -125,28 +126,15 @@ def test_curves_are_polynomials_of_their_points():
             bezier(wrong)
 
 
-def one(function, lower, upper):
-    curves = [ca.SX.sym(n, 2) for n in "xvaj"]
-    given = ca.Function("q", curves, [function(*curves)])
-    return Quantities(
-        function=given,
-        names=("push",),
-        units=("N",),
-        lower=np.array([lower]),
-        upper=np.array([upper]),
-        enclose=enclosure(given),
-    )
-
-
 def test_what_toppra_cannot_keep_is_refused():
     with pytest.raises(ValueError, match="depends on jerk"):
-        retime(CURVE, LIMITS, enclosure, one(lambda x, v, a, j: j[0], -0.01, 0.01))
+        retime(CURVE, LIMITS, enclosure, push(lambda x, v, a, j: j[0], -0.01, 0.01, count=2))
     with pytest.raises(LimitViolatedError, match="path_task"):
-        retime(CURVE, LIMITS, enclosure, one(lambda x, v, a, j: a[0] + 3 * ca.tanh(v[0] / 0.01), -2.0, 2.0))
+        retime(CURVE, LIMITS, enclosure, push(lambda x, v, a, j: a[0] + 3 * ca.tanh(v[0] / 0.01), -2.0, 2.0, count=2))
     with pytest.raises(ValueError, match="needs a finite limit"):
         along(CURVE, MotionLimits(position=(-1, 1), names=("a", "b"), units=("rad", "rad")), None, enclosure)
 
 
 def test_a_lower_limit_above_zero_is_kept():
-    found = retime(CURVE, LIMITS, enclosure, one(lambda x, v, a, j: 10 + a[0] - 0.3 * v[0], 9.3, 30.0))
+    found = retime(CURVE, LIMITS, enclosure, push(lambda x, v, a, j: 10 + a[0] - 0.3 * v[0], 9.3, 30.0, count=2))
     assert found.peaks.lower[-1] >= 9.3 and found.peaks.inside
