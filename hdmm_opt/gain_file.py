@@ -13,9 +13,10 @@ import numpy as np
 from stability import Certificate, Composition, Gains, Sampled, checker
 from trajectories import Reference, Spline
 
+from .axis import KINDS, Axis
 from .control import gain_columns
 from .errors import InvalidInputError
-from .problem import KINDS, Problem, resolved
+from .problem import Problem, resolved
 from .simulation import scenarios
 
 #: Schema of what a refused design leaves behind.
@@ -42,11 +43,11 @@ def build(
     return {
         "schema": checker.SCHEMA,
         "study": resolved(problem),
-        "controller": _controller(problem),
-        "gains": _gains(problem, gains),
+        "controller": controller_data(problem, problem.study.controller.rate_hz),
+        "gains": gains_data(problem, gains),
         "reference": reference_data(problem.reference),
-        "assumptions": _assumptions(problem),
-        "certificate": _certificate(problem, found),
+        "assumptions": assumptions_data(problem),
+        "certificate": certificate_data(problem, found),
         "obligations": [],
         "validation": validation,
         "golden": {"vectors": golden_vectors(problem, gains)},
@@ -162,27 +163,28 @@ def golden_vectors(problem: Problem, gains: tuple[Gains, ...]) -> list[dict[str,
     return vectors
 
 
-def _controller(problem: Problem) -> dict[str, Any]:
-    section = problem.study.controller
+def controller_data(axis: Axis, rate: float) -> dict[str, Any]:
+    """The `controller` section of an axis at a rate, Hz."""
     return {
-        "law": section.law,
-        "modelling": list(section.modelling),
-        "rate_hz": section.rate_hz,
-        "period_s": problem.bounds.period,
+        "law": "rac",
+        "modelling": list(axis.law.modelling),
+        "rate_hz": rate,
+        "period_s": axis.bounds.period,
         "subsystems": [
             {"state": row.state, "unit": row.unit, "tracks": row.target, "governed": row.governed}
-            for row in problem.law.rows
+            for row in axis.law.rows
         ],
-        "nominal": dict(problem.bounds.nominal),
+        "nominal": dict(axis.bounds.nominal),
     }
 
 
-def _gains(problem: Problem, gains: tuple[Gains, ...]) -> list[dict[str, Any]]:
+def gains_data(axis: Axis, gains: tuple[Gains, ...]) -> list[dict[str, Any]]:
+    """The `gains` section."""
     values = [getattr(g, kind) for g in gains for kind in KINDS]
     entries = []
-    for value, item in zip(values, problem.ranges, strict=True):
+    for value, item in zip(values, axis.ranges, strict=True):
         kind, _, subsystem = item.name.partition("_")
-        state = problem.plant.states[problem.law.governed[int(subsystem) - 1]]
+        state = axis.plant.states[axis.law.governed[int(subsystem) - 1]]
         entries.append({
             "name": item.name, "value": value, "unit": item.unit, "min": item.low, "max": item.high,
             "meaning": f"{_MEANING[kind]} of subsystem {subsystem} ({state})", "dtype": "float32",
@@ -190,14 +192,18 @@ def _gains(problem: Problem, gains: tuple[Gains, ...]) -> list[dict[str, Any]]:
     return entries
 
 
-def _assumptions(problem: Problem) -> list[dict[str, Any]]:
-    bounds, plant = problem.bounds, problem.plant
+def assumptions_data(axis: Axis) -> list[dict[str, Any]]:
+    """The `assumptions` section."""
+    bounds, plant = axis.bounds, axis.plant
     entries = []
     for name, p in plant.parameters.items():
         interval = bounds.parameters[name]
         entries.append((f"parameter.{name}", interval.low, interval.high, p.unit, p.source))
     for name, interval in bounds.disturbances.items():
-        entries.append((f"disturbance.{name}", interval.low, interval.high, "N", "study"))
+        entries.append((f"disturbance.{name}", interval.low, interval.high, plant.load_unit, "study"))
+    for name, (value, rate) in bounds.feedforward.items():
+        entries.append((f"feedforward.{name}", value.low, value.high, plant.load_unit, "study"))
+        entries.append((f"feedforward_rate.{name}", rate.low, rate.high, f"{plant.load_unit}/s", "study"))
     for kind, values in (("noise", bounds.noise), ("initial", bounds.initial)):
         for state, unit, value in zip(plant.states, plant.state_units, values, strict=True):
             entries.append((f"{kind}.{state}", -value, value, unit, "study"))
@@ -205,16 +211,17 @@ def _assumptions(problem: Problem) -> list[dict[str, Any]]:
     return [dict(zip(keys, entry, strict=True)) for entry in entries]
 
 
-def _certificate(problem: Problem, found: Certificate) -> dict[str, Any]:
+def certificate_data(axis: Axis, found: Certificate) -> dict[str, Any]:
+    """The `certificate` section."""
     composed = isinstance(found, Composition)
     data: dict[str, Any] = {
         "kind": "composition" if composed else "sampled",
-        "model": problem.model.to_data(),
+        "model": axis.model.to_data(),
         "decay": short(found.decay),
         "radii": [short(v, up=True) for v in found.radii],
         "held": [short(v, up=True) for v in found.held],
         "envelope": {
-            "initial": [short(v, up=True) for v in problem.bounds.initial],
+            "initial": [short(v, up=True) for v in axis.bounds.initial],
             "rate": short((0.4999999 if composed else 0.9999999) * found.decay),
             "ball": [short(v * (1 + 1e-5), up=True) for v in found.ball],
         },

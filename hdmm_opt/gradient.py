@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from stability import Certificate, Failure, Gains
 from tuning import Budget, Derivatives, descend
 
+from .axis import KINDS
 from .evaluation import certified_cost, cost_scales, cost_scenarios, find, simulated_cost
-from .problem import KINDS, Problem
+from .problem import Problem
 from .proof import HEADROOM, slacks
 from .simulation import Run
 

@@ -13,9 +13,10 @@ from typing import Any
 from stability import Certificate, Failure, Gains, checker
 
 from . import gain_file, validation
+from .axis import KINDS
 from .errors import DefectError
 from .falsification import contradiction, falsify, stored
-from .problem import KINDS, Problem, assemble, resolved
+from .problem import Problem, assemble, resolved
 from .proof import Verdict, candidates, compared, diagnose, longest_period, strongest, violation
 from .selection import Options, Progress, search, starting_point
 from .state import State

@@ -3,99 +3,40 @@
 from __future__ import annotations
 
 import json
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stability import Bounds, Gains, Interval, LoopModel
+from stability import Bounds, Interval
 from trajectories import Reference
 
+from .axis import KINDS, Axis, GainRange, parameter_range, reference_ranges
 from .control import RAC
 from .errors import InvalidInputError
 from .motion import build_reference
-from .plants import Parameter, Plant, pmsm_emla
+from .plants import Plant, pmsm_emla
 from .simulation import ClosedLoop, Yardstick
-from .study import Study, nearest, validated
+from .study import GainSection, Study, nearest, validated
 
 Array = NDArray[np.float64]
 
-KINDS = ("beta", "epsilon", "delta", "sigma")
 _SUFFIX = {"m": "m", "m/s": "m_s", "N m": "nm", "A": "a"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class GainRange:
-    """A gain of the study: fixed, or between two values.
-
-    Attributes:
-        name: Name in the study, for example "beta_1".
-        low: Smallest value.
-        high: Largest value; equal to `low` for a fixed gain.
-        unit: SI unit.
-    """
-
-    name: str
-    low: float
-    high: float
-    unit: str
-
-    @property
-    def fixed(self) -> bool:
-        """True where nothing is searched."""
-        return self.low == self.high
-
-
-@dataclass(frozen=True, kw_only=True)
-class Problem:
-    """Everything that the pipeline works on.
+class Problem(Axis):
+    """Everything that the pipeline works on: an axis with its study.
 
     Attributes:
         study: The study.
-        plant: The plant.
-        law: The law.
-        model: Plant and law as data.
-        reference: The reference.
-        bounds: The assumptions of the proof.
-        box: Largest set of errors that the proof may use. Shape (n,).
-        ranges: The gains, four for each governed row.
         loop: The closed loop for simulation.
     """
 
     study: Study
-    plant: Plant
-    law: RAC
-    model: LoopModel
-    reference: Reference
-    bounds: Bounds
-    box: Array
-    ranges: tuple[GainRange, ...]
     loop: ClosedLoop
-
-    @property
-    def searched(self) -> list[int]:
-        """Indices of the gains that are not fixed."""
-        return [i for i, gain in enumerate(self.ranges) if not gain.fixed]
-
-    def gains(self, point: Array, *, digits: int = 4) -> tuple[Gains, ...]:
-        """Gains at a point of the unit cube, logarithmic in every range, as decimals of so many digits."""
-        values = [gain.low for gain in self.ranges]
-        for index, share in zip(self.searched, point, strict=True):
-            gain = self.ranges[index]
-            exact = gain.low * (gain.high / gain.low) ** float(share)
-            values[index] = min(max(float(f"{exact:.{digits}g}"), gain.low), gain.high)
-        return tuple(Gains(**dict(zip(KINDS, values[k : k + 4], strict=True))) for k in range(0, len(values), 4))
-
-    def point(self, gains: tuple[Gains, ...]) -> Array:
-        """The point of the unit cube that stands for some gains."""
-        values = [getattr(g, kind) for g in gains for kind in KINDS]
-        shares = []
-        for index in self.searched:
-            gain = self.ranges[index]
-            shares.append(math.log(values[index] / gain.low) / math.log(gain.high / gain.low))
-        return np.clip(np.array(shares), 0.0, 1.0)
 
 
 def assemble(study: Study, reference: Reference | None = None) -> Problem:
@@ -122,7 +63,7 @@ def assemble(study: Study, reference: Reference | None = None) -> Problem:
             )
     noise = _by_state("uncertainty.noise", study.uncertainty.noise, plant)
     initial = _by_state("uncertainty.initial", study.uncertainty.initial, plant)
-    ranges = _ranges(study, law)
+    ranges = gain_ranges(law, study.controller.gains)
     reference = build_reference(study, plant) if reference is None else reference
     if not study.validation.transient_s < reference.duration:
         raise InvalidInputError(
@@ -135,7 +76,7 @@ def assemble(study: Study, reference: Reference | None = None) -> Problem:
         parameters={name: parameter_range(p) for name, p in plant.parameters.items()},
         disturbances={"load_force": Interval(low, high)},
         nominal=nominal,
-        reference=_reference_ranges(reference),
+        reference=reference_ranges(reference),
         noise=noise,
         initial=initial,
         period=1 / study.controller.rate_hz,
@@ -151,28 +92,11 @@ def assemble(study: Study, reference: Reference | None = None) -> Problem:
     )  # fmt: skip
     return Problem(
         study=study, plant=plant, law=law, model=law.loop_model(), reference=reference, bounds=bounds,
-        box=_box(plant), ranges=ranges, loop=loop,
+        box=operating_box(plant), ranges=ranges, loop=loop,
     )  # fmt: skip
 
 
-def parameter_range(parameter: Parameter) -> Interval:
-    """The assumed range of a parameter, rounded outwards; a point where the tolerance is zero."""
-    if parameter.tolerance == 0:
-        return Interval(parameter.value)
-    spread = abs(parameter.value) * parameter.tolerance
-    return Interval(parameter.value) + Interval.symmetric(spread * (1 + 1e-15))
-
-
-def _reference_ranges(reference: Reference) -> tuple[Interval, Interval, Interval, Interval]:
-    """Position … jerk, widened by a billionth: the checker recomputes them in exact arithmetic."""
-    ranges = []
-    for low, high in reference.bounds():
-        room = 1e-9 * max(abs(low), abs(high))
-        ranges.append(Interval(low - room, high + room))
-    return (ranges[0], ranges[1], ranges[2], ranges[3])
-
-
-def _box(plant: Plant) -> Array:
+def operating_box(plant: Plant) -> Array:
     """Errors beyond these are no operating point: a tenth of the stroke, and three times each limit."""
     box = [0.1 * (plant.stroke[1] - plant.stroke[0])]
     for state in plant.states[1:]:
@@ -195,12 +119,21 @@ def _by_state(section: str, given: dict[str, float], plant: Plant) -> tuple[floa
     return tuple(given.get(key, 0.0) for key in keys)
 
 
-def _ranges(study: Study, law: RAC) -> tuple[GainRange, ...]:
+def gain_ranges(law: RAC, given: Mapping[str, GainSection], where: str = "controller.gains") -> tuple[GainRange, ...]:
+    """The gains of a law as a study gives them.
+
+    Args:
+        law: The law.
+        given: The entries of the study by name; ε is 0, δ and σ are 1 where they are left out.
+        where: Their place in the study, for messages.
+
+    Raises:
+        InvalidInputError: an unknown name, a missing β, or a gain that is not positive.
+    """
     wanted = [f"{kind}_{k + 1}" for k in range(len(law.governed)) for kind in KINDS]
-    given = study.controller.gains
     for name in given:
         if name not in wanted:
-            raise InvalidInputError(f'unknown key "controller.gains.{name}"; {nearest(name, wanted)}')
+            raise InvalidInputError(f'unknown key "{where}.{name}"; {nearest(name, wanted)}')
     defaults = {"epsilon": 0.0, "delta": 1.0, "sigma": 1.0}
     result = []
     for k, row in enumerate(law.governed):
@@ -208,9 +141,7 @@ def _ranges(study: Study, law: RAC) -> tuple[GainRange, ...]:
             name = f"{kind}_{k + 1}"
             entry = given.get(name)
             if entry is None and kind == "beta":
-                raise InvalidInputError(
-                    f'"controller.gains.{name}" is required and missing; give value, or min and max'
-                )
+                raise InvalidInputError(f'"{where}.{name}" is required and missing; give value, or min and max')
             if entry is None:
                 low = high = defaults[kind]
             elif entry.value is not None:
@@ -218,7 +149,7 @@ def _ranges(study: Study, law: RAC) -> tuple[GainRange, ...]:
             else:
                 low, high = float(entry.min or 0.0), float(entry.max or 0.0)
             if kind != "epsilon" and not low > 0:
-                raise InvalidInputError(f"controller.gains.{name} must be positive: got {low:g}; correct the value")
+                raise InvalidInputError(f"{where}.{name} must be positive: got {low:g}; correct the value")
             result.append(GainRange(name=name, low=low, high=high, unit=_unit(law, row, kind)))
     return tuple(result)
 
@@ -234,19 +165,26 @@ def _unit(law: RAC, row: int, kind: str) -> str:
     return ratio if kind == "beta" else f"sqrt({ratio}/s)/({own})"
 
 
+def plant_data(plant: Plant) -> dict[str, Any]:
+    """A plant with every parameter and limit, as JSON data."""
+    return {
+        "parameters": {
+            name: {"value": p.value, "unit": p.unit, "tolerance": p.tolerance, "source": p.source, "meaning": p.meaning}
+            for name, p in plant.parameters.items()
+        },
+        "limits": [
+            {"name": x.name, "signals": list(x.signals), "value": x.value, "unit": x.unit, "source": x.source}
+            for x in plant.limits
+        ],
+        "stroke_m": list(plant.stroke),
+    }
+
+
 def resolved(problem: Problem) -> dict[str, Any]:
     """The study with every default filled in, as JSON data for the gain file."""
     study, plant = problem.study, problem.plant
     data = study.model_dump(mode="json", exclude_none=True)
-    data["plant"]["parameters"] = {
-        name: {"value": p.value, "unit": p.unit, "tolerance": p.tolerance, "source": p.source, "meaning": p.meaning}
-        for name, p in plant.parameters.items()
-    }
-    data["plant"]["limits"] = [
-        {"name": x.name, "signals": list(x.signals), "value": x.value, "unit": x.unit, "source": x.source}
-        for x in plant.limits
-    ]
-    data["plant"]["stroke_m"] = list(plant.stroke)
+    data["plant"] |= plant_data(plant)
     data["uncertainty"] = {
         "disturbances": {"load_force": list(study.uncertainty.load_force_n)},
         "noise": dict(zip(plant.states, problem.bounds.noise, strict=True)),

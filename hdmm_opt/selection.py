@@ -17,8 +17,9 @@ from tuning import Best, Budget, Outcome, Population, Selection, best_of, select
 from tuning import search as run_search
 from tuning.decimals import rounded, shortest
 
+from .axis import KINDS
 from .evaluation import evaluate, make_evaluator
-from .problem import KINDS, Problem
+from .problem import Problem
 from .proof import certificate, violation
 from .state import State
 from .workers import workers

@@ -12,10 +12,10 @@ import numpy as np
 
 from . import pipeline
 from . import study as study_file
+from .axis import KINDS
 from .errors import InvalidInputError
 from .gain_file import ball_of
 from .plants import defaults
-from .problem import KINDS
 from .selection import Options, Progress
 from .state import State
 from .study import Study, nearest, validated

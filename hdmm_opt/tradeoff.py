@@ -9,8 +9,9 @@ from typing import Any
 from stability import Composition, Gains
 from tuning import Outcome, Population, front, pareto_jaya, start
 
+from .axis import KINDS
 from .evaluation import OBJECTIVES, make_evaluator
-from .problem import KINDS, Problem, assemble
+from .problem import Problem, assemble
 from .selection import Options, Progress, kept_population, starting_point, to_data
 from .state import State
 from .study import Study

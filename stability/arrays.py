@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,61 @@ def enclose_many(expression: Expression, ranges: Mapping[str, Pair]) -> tuple[Ar
         table = run(expression, ranges.__getitem__, _OPERATORS, _constant)
     ends = [[np.broadcast_to(end, count) for end in table[index]] for index in expression.outputs]
     return np.stack([low for low, _ in ends]), np.stack([high for _, high in ends])
+
+
+def tangents_many(
+    expression: Expression, ranges: Mapping[str, Pair], directions: Mapping[str, Mapping[str, Pair]]
+) -> list[dict[str, Pair]]:
+    """Directional derivatives of the outputs over many boxes (forward differentiation).
+
+    Args:
+        expression: The operations.
+        ranges: As for `enclose_many`.
+        directions: For each input that moves, its rate of change along each named direction; arrays of shape (boxes,).
+
+    Returns:
+        For each output the enclosure of its derivative along each direction, over all of the box. What stands still
+        is left out.
+
+    Raises:
+        NotImplementedError: the expression holds an operation that is not differentiated here.
+    """
+
+    def read(name: str) -> _Moving:
+        return _Moving(ranges[name], dict(directions.get(name, {})))
+
+    with np.errstate(all="ignore"):
+        table = run(expression, read, _MOVING, lambda value: _Moving(_constant(value), {}))
+    return [table[index].along for index in expression.outputs]
+
+
+@dataclass(frozen=True)
+class _Moving:
+    """Values over many boxes, and their derivatives along some directions."""
+
+    range: Pair
+    along: dict[str, Pair]
+
+
+def _combined(*parts: tuple[_Moving, Pair]) -> dict[str, Pair]:
+    """The sum of tangents, each times a factor."""
+    found: dict[str, Pair] = {}
+    for moving, factor in parts:
+        for name, value in moving.along.items():
+            scaled = _mul(value, factor)
+            found[name] = _add(found[name], scaled) if name in found else scaled
+    return found
+
+
+def _moving_quotient(a: _Moving, b: _Moving) -> _Moving:
+    inverse = _div(_PLUS, b.range)
+    ratio = _mul(a.range, inverse)
+    return _Moving(ratio, _combined((a, inverse), (b, _neg(_mul(ratio, inverse)))))
+
+
+def _moving_root(a: _Moving) -> _Moving:
+    value = _sqrt(a.range)
+    return _Moving(value, _combined((a, _div(_constant(0.5), value))))
 
 
 def _constant(value: float) -> Pair:
@@ -155,4 +211,18 @@ _OPERATORS: dict[str, Callable[..., Pair]] = {
     "abs": _size,
     "min": lambda a, b: (np.minimum(a[0], b[0]), np.minimum(a[1], b[1])),
     "max": lambda a, b: (np.maximum(a[0], b[0]), np.maximum(a[1], b[1])),
+}
+
+_PLUS, _MINUS = _constant(1.0), _constant(-1.0)
+
+_MOVING: dict[str, Callable[..., _Moving]] = {
+    "add": lambda a, b: _Moving(_add(a.range, b.range), _combined((a, _PLUS), (b, _PLUS))),
+    "sub": lambda a, b: _Moving(_sub(a.range, b.range), _combined((a, _PLUS), (b, _MINUS))),
+    "mul": lambda a, b: _Moving(_mul(a.range, b.range), _combined((a, b.range), (b, a.range))),
+    "div": _moving_quotient,
+    "neg": lambda a: _Moving(_neg(a.range), _combined((a, _MINUS))),
+    "sq": lambda a: _Moving(_square(a.range), _combined((a, _mul(_constant(2.0), a.range)))),
+    "sqrt": _moving_root,
+    "sin": lambda a: _Moving(_sin(a.range), _combined((a, _cos(a.range)))),
+    "cos": lambda a: _Moving(_cos(a.range), _combined((a, _neg(_sin(a.range))))),
 }

@@ -18,7 +18,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise, product
 from pathlib import Path
@@ -31,13 +31,18 @@ REQUIRED = {
     "rac": {
         "composition": ("non-vacuity", "reference", "composition", *_COMMON),
         "sampled": ("non-vacuity", "reference", "contraction", *_COMMON),
+        "network": ("joints", "motion", "promises", "loads", "coupling", "observer", "tool"),
     }
 }
-MAX_BYTES, MAX_DIGITS, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 20_000_000, 300, 2_000, 8, 5_000
+MAX_BYTES, MAX_DIGITS, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 20_000_000, 300, 12_000, 8, 5_000
 #: Cells of a sampled certificate, digits of its numbers, and (vertices + 8) n³ summed over its cells.
 MAX_CELLS, MAX_CELL_DIGITS, MAX_VERTICES = 64, 60, 40_000
-#: Interval products that one check may take; a file of ours takes a few per cent of it.
-MAX_PRODUCTS = 100_000
+#: Interval products that one axis and the coupling of a machine may take; a file of ours takes a tenth of it.
+MAX_PRODUCTS, MAX_COUPLED = 100_000, 20_000_000
+#: Joints of a machine, and slices of time that its motion may be cut into.
+MAX_JOINTS, MAX_SLICES = 8, 4_000
+#: Parts of the ranges of speed and load in which the answer of an acceleration to a load is bounded.
+SPEED_PARTS, LOAD_PARTS = 48, 4
 #: Relative width given to every gain, so that the proof holds for its decimal, its float64 and its float32.
 ROUNDING = Fraction(1, 2**23)
 BITS, MAX_SHIFT = 96, 3_000
@@ -103,13 +108,13 @@ def neg(a: Interval) -> Interval:
 class Work:
     """Counts interval products, so that no file can keep the checker busy for long."""
 
-    products = 0
+    products, allowed = 0, MAX_PRODUCTS
 
 
 def mul(a: Interval, b: Interval) -> Interval:
     """Product."""
     Work.products += 1
-    if Work.products > MAX_PRODUCTS:
+    if Work.products > Work.allowed:
         raise NotProvedError("the model is larger than this checker takes on")
     if a[0] == a[1] == 0 or b[0] == b[1] == 0:
         return ZERO
@@ -171,6 +176,38 @@ def tanh_point(x: Fraction) -> Interval:
 def tanh(a: Interval) -> Interval:
     """Range of tanh."""
     return tanh_point(a[0])[0], tanh_point(a[1])[1]
+
+
+def turn(x: Fraction) -> tuple[Interval, Interval]:
+    """Enclosures of the sine and the cosine of one number, by Taylor sums on |x| <= 1/2 and doubling of the angle."""
+    if abs(x) > 100:
+        raise NotProvedError("an angle of the machine is beyond 100 rad")
+    doublings = 0
+    while abs(x) > Fraction(1, 2):
+        x, doublings = x / 2, doublings + 1
+    term, sums = Fraction(1), [Fraction(1), Fraction(0)]
+    for k in range(1, 28):
+        term = down(term * x / k)
+        sums[k % 2] += -term if k % 4 > 1 else term
+    room = Fraction(1, 2 ** (BITS - 8))
+    cosine, sine = ((down(v - room), up(v + room)) for v in sums)
+    two = (Fraction(2), Fraction(2))
+    for _ in range(doublings):
+        sine, cosine = mul(two, mul(sine, cosine)), add(ONE, neg(mul(two, square(sine))))
+    return sine, cosine
+
+
+def turned(a: Interval) -> tuple[Interval, Interval]:
+    """Ranges of sine and cosine, by their values and slopes at the middle and a curvature of at most 1."""
+    middle = down((a[0] + a[1]) / 2)
+    radius = max(a[1] - middle, middle - a[0])
+    sine, cosine = turn(middle)
+    way, bend = symmetric(radius), symmetric(radius * radius / 2)
+    unit = symmetric(Fraction(1))
+    return (
+        meet(unit, add(add(sine, mul(cosine, way)), bend)),
+        meet(unit, add(add(cosine, mul(neg(sine), way)), bend)),
+    )
 
 
 def magnitude(a: Interval) -> Fraction:
@@ -306,6 +343,13 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
 
 def derivative(program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[str, Form]) -> Form:
     """Directional derivative of the first output, enclosed over the ranges of the inputs."""
+    return derivatives(program, ranges, tangents)[0][1]
+
+
+def derivatives(
+    program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[str, Form]
+) -> list[tuple[Interval, Form]]:
+    """Range and directional derivative of every output, enclosed over the ranges of the inputs."""
     two = (Fraction(2), Fraction(2))
 
     def apply(operator: str, a: tuple[Interval, Form], b: tuple[Interval, Form] | None = None) -> Any:
@@ -319,6 +363,9 @@ def derivative(program: dict[str, Any], ranges: dict[str, Interval], tangents: d
         if operator == "sqrt":
             value = root(x[0], False), root(x[1], True)
             return value, times(dx, inverse(mul(two, value)))
+        if operator in ("sin", "cos"):
+            sine, cosine = turned(x)
+            return (sine, times(dx, cosine)) if operator == "sin" else (cosine, times(dx, neg(sine)))
         if operator == "sq":
             return square(x), times(dx, mul(two, x))
         if operator == "add":
@@ -331,7 +378,7 @@ def derivative(program: dict[str, Any], ranges: dict[str, Interval], tangents: d
         return ratio, times(plus(dx, times(dy, neg(ratio))), inverse(y))
 
     entries = walk(program, lambda n: (ranges[n], tangents.get(n, {})), lambda c: ((c, c), {}), apply)
-    return entries[program["outputs"][0]][1]
+    return [entries[index] for index in program["outputs"]]
 
 
 #: Vectors of each kind of certificate.
@@ -390,6 +437,7 @@ class Claim:
     stroke: Interval
     accuracy: Fraction
     transient: Fraction
+    feedforward: dict[str, tuple[Interval, Interval]] = field(default_factory=dict)
 
     @property
     def governed(self) -> list[int]:
@@ -506,13 +554,14 @@ def check_digests(text: str) -> None:
     )
 
 
-def valid_program(program: Any, what: str) -> dict[str, Any]:
-    """Structure of an operation list: known operators, arguments that come earlier."""
+def valid_program(program: Any, what: str, *, turning: bool = False) -> dict[str, Any]:
+    """Structure of an operation list: known operators, sines and cosines where allowed, arguments that come earlier."""
     need(isinstance(program, dict) and isinstance(program.get("operations"), list), f"{what} must be an operation list")
     operations, arity = (
         program["operations"],
         {"neg": 1, "sq": 1, "sqrt": 1, "tanh": 1, "add": 2, "sub": 2, "mul": 2, "div": 2},
     )
+    arity |= {"sin": 1, "cos": 1} if turning else {}
     need(0 < len(operations) <= MAX_OPERATIONS, f"{what} must have 1 to {MAX_OPERATIONS} operations")
     clean: list[list[Any]] = []
     for k, entry in enumerate(operations):
@@ -593,6 +642,7 @@ def _read(data: dict[str, Any]) -> Claim:
 
     assumed = assumptions(data["assumptions"], study)
     states, parameters = [row["state"] for row in rows], assumed["parameter"]
+    need(not set(controller["nominal"]) & set(assumed["feedforward"]), "a foreseen disturbance has no nominal value")
     need(reads(plant, plant["outputs"][:n]) <= set(parameters), "an inertia depends on more than constant parameters")
     nominal = {name: number(value, "a nominal value") for name, value in controller["nominal"].items()}
     listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], "r0", "r1", "r2", "r3"]
@@ -603,7 +653,7 @@ def _read(data: dict[str, Any]) -> Claim:
     unread = {*parameters, *assumed["disturbance"]} - reads(plant)
     need(not unread, f"the plant does not use {', '.join(sorted(unread))}, which the study states")
     for term in law:  # r3, the jerk, has no bounded rate
-        allowed = {*states, "r0", "r1", "r2", *(f"nominal.{name}" for name in nominal)}
+        allowed = {*states, "r0", "r1", "r2", *(f"nominal.{name}" for name in {**nominal, **assumed["feedforward"]})}
         need(reads(term) <= allowed, "a modelling term reads what a controller cannot know")
 
     given = {entry["name"]: number(entry["value"], entry["name"]) for entry in data["gains"]}
@@ -652,12 +702,14 @@ def _read(data: dict[str, Any]) -> Claim:
         limits=[{**limit, "value": number(limit["value"], "a limit")} for limit in limits],
         stroke=(stroke[0], stroke[1]), accuracy=number(study["requirements"]["tracking_error_m"], "tracking_error_m"),
         transient=number(study["validation"]["transient_s"], "transient_s"),
+        feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
     )  # fmt: skip
 
 
 def assumptions(entries: list[dict[str, Any]], study: dict[str, Any]) -> dict[str, dict[str, Interval]]:
     """The assumptions by kind; each must cover what the study states."""
-    found: dict[str, dict[str, Interval]] = {kind: {} for kind in ("parameter", "disturbance", "noise", "initial")}
+    kinds = ("parameter", "disturbance", "noise", "initial", "feedforward", "feedforward_rate")
+    found: dict[str, dict[str, Interval]] = {kind: {} for kind in kinds}
     for entry in entries:
         kind, _, name = entry["name"].partition(".")
         bounds = number(entry["lower"], entry["name"]), number(entry["upper"], entry["name"])
@@ -677,6 +729,12 @@ def assumptions(entries: list[dict[str, Any]], study: dict[str, Any]) -> dict[st
     for kind in ("noise", "initial"):
         for name, value in uncertainty[kind].items():
             stated.append((kind, name, -number(value, name), number(value, name)))
+    for kind in ("feedforward", "feedforward_rate"):
+        for name, (low, high) in uncertainty.get(kind, {}).items():
+            stated.append((kind, name, number(low, name), number(high, name)))
+    foreseen = set(found["feedforward"])
+    need(foreseen == set(found["feedforward_rate"]), "a foreseen disturbance needs a range and a range of its rate")
+    need(foreseen <= set(found["disturbance"]), "a foreseen disturbance must be a disturbance")
     need(
         {(k, n) for k, n, _, _ in stated} == {(k, n) for k, of in found.items() for n in of},
         "the assumptions are not those of the study",
@@ -755,6 +813,10 @@ class Loop:
         for name, bounds in {**fixed, **claim.parameters, **claim.disturbances}.items():
             key = ("const", bounds[0]) if bounds[0] == bounds[1] else ("input", name)
             self.nodes[name] = Node(table.key(*key), {"": bounds}, bounds)
+        for name, (bounds, _) in claim.feedforward.items():
+            table.ranges[f"w:{name}"] = bounds
+            self._name(f"nominal.{name}", {f"w:{name}": ONE})
+            self._name(name, {f"w:{name}": ONE, "": claim.disturbances[name]})
         for k, bounds in enumerate(claim.reference):
             table.ranges[f"r{k}"] = bounds
             self._name(f"r{k}", {f"r{k}": ONE})
@@ -829,6 +891,7 @@ class Loop:
         forces = [table.expand(value.form, keep="K") for value in values[n:]]
         moving = {r["state"]: times(f, inverse(m)) for r, f, m in zip(claim.rows, forces, self.mass, strict=True)}
         moving |= {f"r{k}": {f"r{k + 1}": ONE} for k in range(3)}
+        moving |= {f"nominal.{name}": {"": rate} for name, (_, rate) in claim.feedforward.items()}
         self.open: list[Form] = []
         for i, row in enumerate(claim.rows):
             rate = {"r1": ONE} if row["target"] == "reference" else {}
@@ -1196,6 +1259,18 @@ class Period:
             found.append(up(dot(map(abs, self.back[i]), bound) + moved))
         return found
 
+    def speeds(self, bound: list[Fraction]) -> list[Fraction]:
+        """Bounds on |z_i'| for all t, in the box's unit a period, for |y| <= bound at the samples."""
+        here = [dot(map(abs, row), bound) for row in self.back]
+        moved = [total - part for total, part in zip(self.states(bound), here, strict=True)]
+        shaken = [n + d + dot(row, here) for n, d, row in zip(self.noise, self.drift, self.k_spread, strict=True)]
+        found = []
+        for i in range(self.n):
+            size = dot(self.speed[i], bound) + dot(map(abs, self.a[i]), moved) + dot(map(abs, self.b[i]), shaken)
+            size += dot(self.a_spread[i], map(sum, zip(here, moved, strict=True))) + sum(self.b_spread[i], self.push[i])
+            found.append(up(min((1 + self.change[i]) * size, 2 * self.half_way[i])))
+        return found
+
     def inputs(self, bound: list[Fraction]) -> list[Fraction]:
         """Bounds on |u - m|, noise and drift included, in units of the box."""
         rows = zip(self.control, self.noise, self.drift, strict=True)
@@ -1461,9 +1536,9 @@ def vacuity(claim: Claim) -> Fraction:
     return min(1 - initial / radius for initial, radius in zip(claim.initial, claim.radii, strict=True))
 
 
-def obligations(claim: Claim) -> list[Obligation]:
-    """Decide every obligation of the law."""
-    Work.products = 0
+def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
+    """Decide every obligation of the law; with the closed loop, and the verdicts on it."""
+    Work.products, Work.allowed = 0, MAX_PRODUCTS
     made: list[Obligation] = []
 
     def state(name: str, statement: str, margin: Fraction, unit: str, remedy: str, strict: bool = True) -> None:
@@ -1504,7 +1579,7 @@ def obligations(claim: Claim) -> list[Obligation]:
     for i, stated in enumerate(claim.ball):
         if stated < verdict.ball(i):
             raise NotProvedError(f"the envelope states a smaller bound on row {i + 1} than can be proved")
-    return made
+    return made, loop, verdict
 
 
 def scale(claim: Claim, name: str) -> Fraction:
@@ -1530,6 +1605,8 @@ def _golden_one(vector: dict[str, Any], claim: Claim) -> bool:
     named = {row["state"]: value for row, value in zip(claim.rows, x, strict=True)}
     named |= {f"r{j}": value for j, value in enumerate(r)}
     named |= {f"nominal.{name}": float(value) for name, value in claim.nominal.items()}
+    foreseen = numbers(vector.get("load", []), len(claim.feedforward), "golden")
+    named |= {f"nominal.{name}": float(value) for name, value in zip(claim.feedforward, foreseen, strict=True)}
     virtual: dict[int, float] = {}
     following: list[float] = []
     for j, i in enumerate(claim.governed):
@@ -1580,36 +1657,417 @@ def check_text(text: str, file: str = "") -> Report:
         data = parse(text)
         need(data.get("schema") == SCHEMA, wrong_schema(data.get("schema")))
         check_digests(text)
-        claim = read(data)
-        recorded = [entry["name"] for entry in data["obligations"] if entry["verdict"] == "proved"]
-        made = obligations(claim)
-        agree = golden_agree(data, claim)
-        seen = number(data["validation"]["largest_error_m"], "largest_error_m")
-        need(seen >= 0, "largest_error_m must not be negative")
-        envelope = data["certificate"]["envelope"]
-        slower = number(envelope["rate"], "rate") <= claim.decay / (2 if claim.kind == "composition" else 1)
-        stated = numbers(envelope["initial"], len(claim.rows), "initial")
-        wider = all(a >= b for a, b in zip(stated, claim.initial, strict=True))
+        if data["certificate"]["kind"] == "network":
+            return check_machine(data, text, file)
+        return check_axis(data, file)[0]
     except UnreadableError as error:
         return Report(file, 2, f"unreadable: {error}")
     except NotProvedError as error:
         return Report(file, 1, f"not proved: {error}")
     except (KeyError, TypeError, AttributeError, IndexError, ValueError, ZeroDivisionError, OverflowError) as error:
         return Report(file, 2, f"unreadable: a part of the gain file is missing or malformed: {error!r:.120}")
+
+
+def check_axis(data: dict[str, Any], file: str) -> tuple[Report, Claim, Loop, Composed | Held]:
+    """Re-prove the file of one axis; with the claim, its closed loop and the verdicts on it."""
+    claim = read(data)
+    recorded = [entry["name"] for entry in data["obligations"] if entry["verdict"] == "proved"]
+    made, loop, verdict = obligations(claim)
+    agree = golden_agree(data, claim)
+    seen = number(data["validation"]["largest_error_m"], "largest_error_m")
+    need(seen >= 0, "largest_error_m must not be negative")
+    envelope = data["certificate"]["envelope"]
+    slower = number(envelope["rate"], "rate") <= claim.decay / (2 if claim.kind == "composition" else 1)
+    stated = numbers(envelope["initial"], len(claim.rows), "initial")
+    wider = all(a >= b for a, b in zip(stated, claim.initial, strict=True))
     missing = [name for name in REQUIRED[data["controller"]["law"]][claim.kind] if recorded.count(name) != 1]
+    failed = [o for o in made if o.verdict != "proved"]
+    bound, settled = float(claim.ball[0]) * 1e3, float(claim.transient)
+    status, message = 0, f"proved: |tracking error| <= {bound:.4g} mm from {settled:g} s on"
     if missing:
-        return Report(file, 1, f"not proved: the file leaves out the obligation {missing[0]}", made)
+        status, message = 1, f"not proved: the file leaves out the obligation {missing[0]}"
+    elif failed:
+        status, message = 1, f"not proved: {failed[0].name} (margin {failed[0].margin:.4g} {failed[0].unit})"
+    elif not (slower and wider):
+        status, message = 1, "not proved: the envelope states a faster rate or a smaller initial set"
+    elif not agree:
+        status, message = 1, "not proved: the golden vectors do not follow from the gains and the law"
+    elif seen > claim.radii[0]:
+        status, message = 1, "not proved: the recorded simulation leaves the certified envelope"
+    return Report(file, status, message, made), claim, loop, verdict
+
+
+# --- machines: joints that push each other ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint of a machine: its proved claim, and the tube |z_1|, |z_2|, |z_2'| that its proof gives for all t."""
+
+    name: str
+    claim: Claim
+    loop: Loop
+    reached: tuple[Fraction, Fraction, Fraction]
+    ball: Fraction
+
+
+def check_machine(data: dict[str, Any], text: str, file: str) -> Report:
+    """Re-prove the file of a machine: each joint by itself, then what the joints assume of each other."""
+    names = [entry["name"] for entry in data["controller"]["joints"]]
+    need(0 < len(names) <= MAX_JOINTS and len(set(names)) == len(names), f"a machine has 1 to {MAX_JOINTS} joints")
+    need(set(data["joints"]) == set(names), "the joints are not those of the controller")
+    for name in names:
+        need(NAME.fullmatch(name) is not None, "a joint's name must be a plain identifier")
+    plain, joints = json.loads(text), []
+    made: list[Obligation] = []
+    for name in names:
+        own = data["joints"][name]
+        need(own.get("schema") == SCHEMA, wrong_schema(own.get("schema")))
+        check_digests(json.dumps(plain["joints"][name]))
+        belongs(data, own, name)
+        report, claim, loop, verdict = check_axis(own, file)
+        made += [replace(o, name=f"{name}: {o.name}") for o in report.obligations]
+        if report.status:
+            return Report(file, 1, f"not proved: {name}: {report.message.removeprefix('not proved: ')}", made)
+        need(isinstance(verdict, Held) and len(claim.rows) > 1, "a joint of a machine needs a sampled certificate")
+        assert isinstance(verdict, Held)
+        joints.append(Joint(name, claim, loop, tube_of(claim, verdict), verdict.ball(0)))
+    Work.products, Work.allowed = 0, MAX_COUPLED
+    machine = Machine(data, joints)
+    made += machine.obligations()
+    recorded = [entry["name"] for entry in data["obligations"] if entry["verdict"] == "proved"]
+    for name in REQUIRED[data["controller"]["law"]]["network"]:
+        if recorded.count(name) != 1:
+            return Report(file, 1, f"not proved: the file leaves out the obligation {name}", made)
     failed = [o for o in made if o.verdict != "proved"]
     if failed:
         return Report(file, 1, f"not proved: {failed[0].name} (margin {failed[0].margin:.4g} {failed[0].unit})", made)
-    if not (slower and wider):
-        return Report(file, 1, "not proved: the envelope states a faster rate or a smaller initial set", made)
-    if not agree:
-        return Report(file, 1, "not proved: the golden vectors do not follow from the gains and the law", made)
-    if seen > claim.radii[0]:
+    seen = number(data["validation"]["largest_error_m"], "largest_error_m")
+    need(seen >= 0, "largest_error_m must not be negative")
+    if seen > machine.tool([joint.reached[0] for joint in joints]):
         return Report(file, 1, "not proved: the recorded simulation leaves the certified envelope", made)
-    bound, settled = float(claim.ball[0]) * 1e3, float(claim.transient)
-    return Report(file, 0, f"proved: |tracking error| <= {bound:.4g} mm from {settled:g} s on", made)
+    bound, settled = float(machine.stated) * 1e3, float(joints[0].claim.transient)
+    return Report(file, 0, f"proved: |tool error| <= {bound:.4g} mm from {settled:g} s on, all joints together", made)
+
+
+def tube_of(claim: Claim, verdict: Held) -> tuple[Fraction, Fraction, Fraction]:
+    """Bounds on |z_1|, |z_2| and |z_2'| for all t."""
+    speed = max(period.speeds(period.cell.start)[1] for period in verdict.periods)
+    return claim.radii[0], claim.radii[1], up(speed * claim.radii[1] / claim.period)
+
+
+def belongs(data: dict[str, Any], own: dict[str, Any], name: str) -> None:
+    """Refuse a joint whose statement is not that of the machine's study."""
+    study, part = data["study"], own["study"]
+    stated, section = study["plant"]["axes"][name], study["controller"]
+    need(part["plant"] == stated, f"{name}: the plant is not the study's")
+    same = [
+        (own["controller"]["law"], section["law"]),
+        (number(own["controller"]["rate_hz"], "rate_hz"), number(section["rate_hz"], "rate_hz")),
+        (own["controller"]["modelling"], section["modelling"]),
+        (part["controller"]["gains"], study["ranges"][name]),
+        (part["requirements"]["tracking_error_m"], study["requirements"]["joint_error"][name]),
+        (part["validation"]["transient_s"], study["validation"]["transient_s"]),
+        (part["uncertainty"]["initial"], study["uncertainty"]["axes"][name]["initial"]),
+        (own["reference"]["segments"], data["reference"]["joints"][name]["segments"]),
+    ]
+    need(all(a == b for a, b in same), f"{name}: the statement is not the study's")
+    least = study["uncertainty"]["axes"][name]["noise"]
+    for state, value in part["uncertainty"]["noise"].items():
+        wanted = number(least.get(state, 0), state)
+        need(number(value, state) >= wanted, f"{name}: less noise is assumed than the study states")
+
+
+class Machine:
+    """What the joints do to each other over slices of time; see `docs/machine.md`.
+
+    The load of joint i is ``w_i = F_i(x, v, a, payload) - m_i a_i``. On every slice it is foreseen along the reference,
+    and its deviation bounded by the mean value theorem while all joints keep their promised tubes.
+    """
+
+    def __init__(self, data: dict[str, Any], joints: list[Joint]) -> None:
+        self.joints, self.count = joints, len(joints)
+        certificate, controller = data["certificate"], data["controller"]
+        self.loads = valid_program(certificate["loads"], "the loads", turning=True)
+        self.place = valid_program(certificate["tool"], "the tool", turning=True)
+        inputs = [f"{letter}{j}" for letter in "xva" for j in range(self.count)]
+        need(len(self.loads["outputs"]) == self.count, "each joint needs a load")
+        need(reads(self.loads) <= {*inputs, "payload"}, "the loads read a name that no joint has")
+        need(reads(self.place) <= set(inputs[: self.count]), "the tool reads a name that no joint has")
+        self.own = [self._own(joint) for joint in joints]
+        low, high = numbers(data["study"]["uncertainty"]["payload_kg"], 2, "payload_kg")
+        need(0 <= low <= high, "the payload's range is upside down")
+        self.payload = (low, high)
+        self.foreseeing = "mechanics" in controller["modelling"]
+        for joint in joints:
+            need(bool(joint.claim.feedforward) == self.foreseeing, "what the joints foresee is not what the law models")
+            need(set(joint.claim.disturbances) == {"load_force"}, "a joint of a machine has one disturbance, its load")
+        self.promise = [tuple(numbers(certificate["promises"][j.name], 3, "a promise")) for j in joints]
+        self.stated = number(certificate["envelope"]["tool"], "the bound on the tool")
+        self.required = number(data["study"]["requirements"]["tool_error_m"], "tool_error_m")
+        self.slices = list(slices(data["reference"]["joints"], [j.name for j in joints], certificate["halvings"]))
+        self.observer = observer_of(data)
+        self.encoder = number(data["study"]["uncertainty"]["noise"]["position"], "the encoder's error")
+        self.slopes: list[list[Fraction]] = [[Fraction(0)] * self.count for _ in joints]
+
+    def _own(self, joint: Joint) -> Fraction:
+        """The inertia of the bodies that a joint's own model carries."""
+        names = [name for name in ("load_mass", "load_inertia") if name in joint.claim.parameters]
+        need(len(names) == 1, f"{joint.name}: the plant must carry a part of the machine's inertia")
+        low, high = joint.claim.parameters[names[0]]
+        # parameters are widened by a billionth of a billionth where they have a tolerance; this one has none
+        need(low == high, f"{joint.name}: its part of the machine's inertia must be a number")
+        return low
+
+    def obligations(self) -> list[Obligation]:
+        """Decide what joins the joints."""
+        made: list[Obligation] = []
+
+        def state(name: str, statement: str, margin: Fraction, unit: str, remedy: str) -> None:
+            verdict = "proved" if margin > 0 else "undecided"
+            made.append(Obligation(name, statement, float(margin), unit, verdict, "" if margin > 0 else remedy))
+
+        state("joints", f"{self.count} joints, each proved under its own assumptions", Fraction(1), "1", "")
+        statement = "the references of all joints share their knots and stay inside the strokes"
+        state("motion", statement, Fraction(len(self.slices)), "slices", "references of one duration")
+        kept = [
+            1 - got / said for joint, told in zip(self.joints, self.promise, strict=True)
+            for got, said in zip(joint.reached, told, strict=True) if said > 0
+        ]  # fmt: skip
+        told = len(kept) == 3 * self.count
+        statement = "each joint keeps its promise on position, speed and acceleration"
+        state("promises", statement, min(kept) if told else Fraction(-1), "1", "a certificate made for these gains")
+        worst, which = self._loads()
+        statement = f"what the joints do to each other is inside what each was proved under; the tightest is {which}"
+        state("loads", statement, worst, "1", "smaller promises, or gains that are proved under more load")
+        spare = self._well_posed()
+        statement = "the accelerations follow from the loads in one way only: the coupling contracts"
+        state("coupling", statement, spare, "1", "less coupling between the joints, or more inertia of the actuators")
+        spare, statement = self._observed()
+        state("observer", statement, spare, "1", "an observer that is faster, or a better encoder")
+        bound = self.tool([joint.ball for joint in self.joints])
+        if self.stated < bound:
+            raise NotProvedError("the envelope states a smaller bound on the tool than can be proved")
+        settled = float(self.joints[0].claim.transient)
+        statement = f"from {settled:g} s on the tool is within {float(bound) * 1e3:.4g} mm of its reference"
+        needed = f"a requirement of {float(bound) * 1.0001e3:.4g} mm"
+        state("tool", statement, self.required - bound, "m", needed)
+        return made
+
+    def _ranges(self, part: list[list[Interval]], radii: list[tuple[Fraction, ...]]) -> dict[str, Interval]:
+        return {
+            f"{letter}{j}": add(part[j][order], symmetric(radii[j][order]))
+            for order, letter in enumerate("xva") for j in range(self.count)
+        }  # fmt: skip
+
+    def _loads(self) -> tuple[Fraction, str]:
+        """The smallest spare of what the joints assume of their loads, relative to its size; and where."""
+        nothing = [(Fraction(0),) * 3] * self.count
+        middle = (self.payload[0] + self.payload[1]) / 2
+        half = symmetric((self.payload[1] - self.payload[0]) / 2)
+        spare: list[tuple[Fraction, str]] = []
+        for part in self.slices:
+            along = {
+                f"{letter}{j}": {"": part[j][order]}
+                for order, letter in enumerate("xva", 1) for j in range(self.count)
+            }  # fmt: skip
+            at_reference = {**self._ranges(part, nothing), "payload": (middle, middle)}
+            foreseen = derivatives(self.loads, at_reference, along)
+            beside: dict[str, Form] = {name: {name: ONE} for name in self._ranges(part, nothing)}
+            beside["payload"] = {"": half}
+            around = {**self._ranges(part, self.promise), "payload": self.payload}
+            moved = derivatives(self.loads, around, beside)
+            for i, joint in enumerate(self.joints):
+                size = magnitude(moved[i][1].get("", ZERO))
+                for name, slope in moved[i][1].items():
+                    if name:
+                        j = int(name[1:])
+                        if name == f"a{i}":
+                            slope = add(slope, neg((self.own[i], self.own[i])))
+                        if name[0] == "a":
+                            self.slopes[i][j] = max(self.slopes[i][j], magnitude(slope))
+                        size = up(size + magnitude(slope) * self.promise[j]["xva".index(name[0])])
+                own = (self.own[i], self.own[i])
+                load = add(foreseen[i][0], neg(mul(own, part[i][2])))
+                rate = add(foreseen[i][1].get("", ZERO), neg(mul(own, part[i][3])))
+                spare.append((self._inside(joint.claim, load, rate, size), joint.name))
+        return min(spare)
+
+    def _inside(self, claim: Claim, load: Interval, rate: Interval, size: Fraction) -> Fraction:
+        """How much room the assumptions of a joint leave to its load on a slice."""
+        assumed = claim.disturbances["load_force"]
+        known = claim.feedforward.get("load_force")
+        if known is not None:
+            foreseen = all(o[0] <= a[0] and a[1] <= o[1] for a, o in ((load, known[0]), (rate, known[1])))
+            load = ZERO if foreseen else symmetric(2 * magnitude(assumed))
+        inner = add(load, symmetric(size))
+        return min(inner[0] - assumed[0], assumed[1] - inner[1]) / max(magnitude(assumed), Fraction(1, 10**9))
+
+    def _well_posed(self) -> Fraction:
+        """1 - max N s / s for N_ij = sup|dw_i/da_j| sup|da_j/dw_j|: positive where the map of the loads contracts."""
+        slopes = [self._answer(joint) for joint in self.joints]
+        matrix = [[v * slopes[j] for j, v in enumerate(row)] for row in self.slopes]
+        shape = [Fraction(1)] * self.count
+        for _ in range(60):
+            shape = [down(dot(row, shape) + Fraction(1, 10**6)) for row in matrix]
+            largest = max(shape)
+            shape = [down(v / largest) + Fraction(1, 10**9) for v in shape]
+        return 1 - max(dot(row, shape) / own for row, own in zip(matrix, shape, strict=True))
+
+    def _answer(self, joint: Joint) -> Fraction:
+        """How much the acceleration of a joint moves with its load, at most."""
+        claim, loop = joint.claim, joint.loop
+        program = {**claim.plant, "outputs": [claim.plant["outputs"][len(claim.rows) + 1]]}
+        ranges = {name: node.range for name, node in loop.nodes.items()}
+        rate, worst = claim.rows[1]["state"], Fraction(0)
+        # friction that changes sides with power makes the slope depend on speed and load: small parts of both
+        for speed, load in product(cut(ranges[rate], SPEED_PARTS), cut(ranges["load_force"], LOAD_PARTS)):
+            here = {**ranges, rate: speed, "load_force": load}
+            worst = max(worst, magnitude(derivative(program, here, {"load_force": {"": ONE}}).get("", ZERO)))
+        return up(worst / loop.mass[1][0])
+
+    def _observed(self) -> tuple[Fraction, str]:
+        """How much room the assumed measurement errors leave to the errors of the observers."""
+        if self.observer is None:
+            spare = [self._share(joint.claim.noise[0], self.encoder) for joint in self.joints]
+            return min(spare), "there is no observer: position and speed are measured"
+        found = []
+        for joint in self.joints:
+            claim = joint.claim
+            jerk = magnitude(claim.reference[3])
+            told = self.promise[self.joints.index(joint)]
+            position, speed = self.observer.errors(self.encoder, told[2] + claim.period * jerk, claim.initial[1])
+            need(self.observer.period == claim.period, "the observer's period is not that of the law")
+            found += [self._share(claim.noise[0], position), self._share(claim.noise[1], speed)]
+        return min(found), "the errors of every observer are inside the assumed measurement errors"
+
+    def _share(self, assumed: Fraction, error: Fraction) -> Fraction:
+        """Room relative to what is assumed; where both are the same number there is room enough."""
+        if assumed < error:
+            return -Fraction(1)
+        return (assumed - error) / assumed + Fraction(1, 10**12) if assumed > 0 else Fraction(1)
+
+    def tool(self, radii: list[Fraction]) -> Fraction:
+        """Bound on the distance of the tool from its reference while |x_i - r_i| <= radii_i."""
+        worst = Fraction(0)
+        for part in self.slices:
+            ranges = {f"x{j}": add(part[j][0], symmetric(radius)) for j, radius in enumerate(radii)}
+            moved = derivatives(self.place, ranges, {name: {name: ONE} for name in ranges})
+            sizes = [sum((magnitude(v) * radii[int(name[1:])] for name, v in form.items()), ZERO[0]) for _, form in moved]
+            worst = max(worst, up(sum((size * size for size in sizes), ZERO[0])))
+        return root(worst, True)
+
+
+def cut(a: Interval, count: int) -> list[Interval]:
+    """Parts of an interval that cover it."""
+    ends = [a[0] + (a[1] - a[0]) * Fraction(k, count) for k in range(count + 1)]
+    return list(pairwise(ends))
+
+
+@dataclass(frozen=True)
+class Observer:
+    """A sampled motion-state observer with one adaptive scalar, and the coordinates that prove it."""
+
+    first: Fraction
+    second: Fraction
+    largest: Fraction
+    period: Fraction
+    pole: Fraction
+
+    def errors(self, noise: Fraction, acceleration: Fraction, initial: Fraction) -> tuple[Fraction, Fraction]:
+        """Bounds on the errors of position and speed at every sample.
+
+        In y_1 = e_1, y_2 = e_2 + k e_1 the errors obey |y(t + T)| <= A |y| + b; R = (I - A)^-1 b is not left, and
+        neither is any multiple of it that holds the start.
+        """
+        t, middle, spread = self.period, 1 + self.largest / 2, self.largest / 2
+        inflate = 1 + ROUNDING
+        k = (1 - middle * self.first - self.pole) / t
+        inward = (self.first, self.second + k * self.first)
+        a11, a12 = abs(1 - middle * self.first - k * t) + spread * abs(inward[0]), t
+        a21 = abs(-middle * inward[1] + k - k * (1 + k * t)) + spread * abs(inward[1])
+        a22 = abs(1 + k * t)
+        factor = (1 + self.largest) * noise
+        b1 = factor * abs(inward[0]) + acceleration * t * t / 2
+        b2 = factor * abs(inward[1]) + acceleration * t * (1 + abs(k) * t / 2)
+        determinant = (1 - a11) * (1 - a22) - a12 * a21
+        if not (a11 < 1 and a22 < 1 and determinant > 0):
+            raise NotProvedError("the observer does not contract for every value of its adaptive scalar")
+        reach = [((1 - a22) * b1 + a12 * b2) / determinant, (a21 * b1 + (1 - a11) * b2) / determinant]
+        start = [noise, initial + abs(k) * noise]
+        need(min(reach) > 0, "an observer without any error proves nothing")
+        widest = max(Fraction(1), *(s / r for s, r in zip(start, reach, strict=True)))
+        reach = [up(widest * r * inflate) for r in reach]
+        return reach[0], up(reach[1] + abs(k) * reach[0])
+
+
+def observer_of(data: dict[str, Any]) -> Observer | None:
+    """The observer of the file, or None."""
+    section, study = data["controller"].get("observer"), data["study"]["controller"].get("observer")
+    need((section is None) == (study is None), "the observer is not the study's")
+    if section is None:
+        return None
+    first, second, largest, period, pole = (
+        number(section[key], f"the observer's {key}") for key in ("first", "second", "largest", "period_s", "pole")
+    )
+    need(first > 0 and second > 0 and largest >= 0 and period > 0, "the observer's gains must be positive")
+    need(largest == number(study["largest"], "largest"), "the observer's adaptive scalar is not the study's")
+    rate = number(data["controller"]["rate_hz"], "rate_hz")
+    need(abs(period * rate - 1) < Fraction(1, 10**12), "the observer's period is not 1 / rate_hz")
+    return Observer(first, second, largest, 1 / rate, pole)
+
+
+def slices(references: dict[str, Any], names: list[str], halvings: Any) -> Iterable[list[list[Interval]]]:
+    """Ranges of position … jerk of every joint over slices of time: pieces between knots, each halved some times."""
+    parts = 2 ** index(halvings, 9, "halvings")
+    together = [references[name]["segments"] for name in names]
+    need(len({len(segments) for segments in together}) == 1, "the references of the joints have different segments")
+    count = 0
+    for segments in zip(*together, strict=True):
+        knots = [number(k, "a knot") for k in segments[0]["knots"]]
+        for segment in segments[1:]:
+            need(segment["knots"] == segments[0]["knots"], "the references of the joints have different knots")
+        points = [[number(c, "a coefficient") for c in segment["coefficients"]] for segment in segments]
+        for span in range(5, len(knots) - 6):
+            low, high = knots[span], knots[span + 1]
+            if low == high:
+                continue
+            cut = 1 if len(points[0]) == 6 else parts
+            for k in range(cut):
+                ends = low + (high - low) * Fraction(k, cut), low + (high - low) * Fraction(k + 1, cut)
+                count += 1
+                need(count <= MAX_SLICES, f"the motion is cut into more than {MAX_SLICES} slices")
+                yield [ranges_on(knots, own, span, ends) for own in points]
+
+
+def ranges_on(
+    knots: list[Fraction], points: list[Fraction], span: int, ends: tuple[Fraction, Fraction]
+) -> list[Interval]:
+    """Hulls of the Bezier points of position … jerk of a spline on a part of a span, by blossoms (Ramshaw 1989)."""
+    degree = 5
+    curve = [
+        blossom(knots, points, span, [ends[0]] * (degree - k) + [ends[1]] * k) for k in range(degree + 1)
+    ]  # fmt: skip
+    found = []
+    for order in range(4):
+        found.append((down(min(curve)), up(max(curve))))
+        curve = [(degree - order) * (b - a) / (ends[1] - ends[0]) for a, b in pairwise(curve)]
+    return found
+
+
+def blossom(knots: list[Fraction], points: list[Fraction], span: int, arguments: list[Fraction]) -> Fraction:
+    """The symmetric multi-affine form of a spline's piece."""
+    degree = len(arguments)
+    values = points[span - degree : span + 1]
+    for level, t in enumerate(arguments):
+        following = []
+        for j in range(degree - level):
+            first = knots[span - degree + level + 1 + j]
+            last = knots[span + 1 + j]
+            share = (t - first) / (last - first)
+            following.append(values[j] + share * (values[j + 1] - values[j]))
+        values = following
+    return values[0]
 
 
 def check_file(path: Path) -> Report:

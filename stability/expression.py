@@ -188,6 +188,73 @@ def straight_line(function: Any, names: tuple[str, ...]) -> Expression:
     return _pruned(builder.operations, outputs)
 
 
+def algebraic(expression: Expression) -> Expression:
+    """The same function without arc cosines, where they occur inside sines and cosines alone.
+
+    With φ = ±acos(u) + k, cos φ = u cos k ∓ √(1 - u²) sin k and sin φ = ±√(1 - u²) cos k + u sin k: a linear actuator
+    across a joint enters its dynamics through such angles. What is left has the operations that `checker.py` knows.
+
+    Raises:
+        ValueError: an angle is used otherwise.
+    """
+    builder = _Builder()
+    moved: list[int] = []
+    angles: dict[int, tuple[int, float, float]] = {}  # entry -> (u, sign, k)
+    numbers: dict[int, float] = {}
+    for index, (operator, *arguments) in enumerate(expression.operations):
+        entry = -1
+        if operator in ("input", "const"):
+            entry = builder.add(operator, *arguments)
+            if operator == "const":
+                numbers[index] = float(arguments[0])
+        elif operator == "acos":
+            angles[index] = (moved[arguments[0]], 1.0, 0.0)
+        elif any(argument in angles for argument in arguments):
+            angle = _shifted(operator, arguments, angles, numbers)
+            if angle is not None:
+                angles[index] = angle
+            elif operator in ("sin", "cos"):
+                entry = _turned(builder, operator, *angles[arguments[0]])
+            else:
+                raise ValueError(f"an angle of an actuator occurs in sines and cosines alone: got {operator}")
+        else:
+            entry = builder.add(operator, *(moved[argument] for argument in arguments))
+        moved.append(entry)
+    if any(index in angles for index in expression.outputs):
+        raise ValueError("an angle of an actuator occurs in sines and cosines alone: it is an output")
+    return _pruned(builder.operations, tuple(moved[index] for index in expression.outputs))
+
+
+def _shifted(
+    operator: str, arguments: list[int], angles: Mapping[int, tuple[int, float, float]], numbers: Mapping[int, float]
+) -> tuple[int, float, float] | None:
+    """The angle ±acos(u) + k that an operation makes of another, or None."""
+    if operator == "neg":
+        u, sign, shift = angles[arguments[0]]
+        return u, -sign, -shift
+    if operator not in ("add", "sub"):
+        return None
+    first, second = arguments
+    if first in angles and second in numbers:
+        u, sign, shift = angles[first]
+        return u, sign, shift + (numbers[second] if operator == "add" else -numbers[second])
+    if second in angles and first in numbers:
+        u, sign, shift = angles[second]
+        turn = 1.0 if operator == "add" else -1.0
+        return u, turn * sign, numbers[first] + turn * shift
+    return None
+
+
+def _turned(builder: _Builder, operator: str, u: int, sign: float, shift: float) -> int:
+    """The sine or cosine of sign · acos(u) + shift."""
+    root = builder.add("sqrt", builder.add("sub", builder.const(1.0), builder.add("sq", u)))
+    along, across = math.cos(shift), -sign * math.sin(shift)
+    if operator == "sin":
+        along, across = math.sin(shift), sign * math.cos(shift)
+    parts = builder.add("mul", builder.const(along), u), builder.add("mul", builder.const(across), root)
+    return builder.add("add", *parts)
+
+
 def _pruned(operations: list[tuple[Any, ...]], outputs: tuple[int, ...]) -> Expression:
     """Only the operations that an output needs, in order."""
     needed = set(outputs)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from .expression import Expression
@@ -91,6 +91,8 @@ class Bounds:
         initial: Bound on each |Q_i(0)|. Shape (n,).
         period: Control period in s; 0 for a continuous law.
         transient: Time from which on the bound on the tracking error must hold, s.
+        feedforward: Disturbances that the law foresees as they move, ``nominal.NAME``: range, and range of the rate.
+            `disturbances` then holds what the real one may differ from the foreseen one.
     """
 
     parameters: Mapping[str, Interval]
@@ -101,3 +103,4 @@ class Bounds:
     initial: tuple[float, ...]
     period: float
     transient: float = 0.0
+    feedforward: Mapping[str, tuple[Interval, Interval]] = field(default_factory=dict)

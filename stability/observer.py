@@ -87,3 +87,105 @@ def _bound(first: float, second: float, noise: float, disturbance: float, spread
     found = search(inclusion, np.eye(2)[output], np.array([length, length * frequency]))
     squared = None if found is None else prove(inclusion, found)
     return None if squared is None else math.nextafter(math.sqrt(squared), math.inf)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledObserver:
+    """A motion-state observer in sampled code, with one adaptive scalar (P-4).
+
+        e = y - x̂,   x̂ <- x̂ + T ŝ + T²/2 a + (1 + θ̂) l_1 e,   ŝ <- ŝ + T a + (1 + θ̂) l_2 e,   0 <= θ̂ <= largest
+        θ̂ <- θ̂ + T (ε e²/2 - σ θ̂), kept between its bounds
+
+    Attributes:
+        first: l_1 > 0.
+        second: l_2 > 0, 1/s.
+        largest: Bound on θ̂, 0 or more.
+        period: T, s.
+
+    Raises:
+        ValueError: numbers outside these ranges.
+    """
+
+    first: float
+    second: float
+    largest: float
+    period: float
+
+    def __post_init__(self) -> None:
+        if not (self.first > 0 and self.second > 0 and self.largest >= 0 and self.period > 0):
+            raise ValueError(
+                f"an observer needs positive gains and period, and a bound on θ̂ that is not negative: {self}"
+            )
+
+    @staticmethod
+    def of_bandwidth(bandwidth: float, largest: float, period: float) -> SampledObserver:
+        """A double real pole at exp(-bandwidth · T) for the middle of the adaptive gain."""
+        away = -math.expm1(-bandwidth * period)
+        middle = 1 + largest / 2
+        return SampledObserver(
+            first=_decimal(2 * away / middle), second=_decimal(away**2 / (period * middle)), largest=largest,
+            period=period,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObserverProof:
+    """Bounds that hold at every sample; `checker.py` decides them.
+
+    Attributes:
+        pole: λ of the coordinates y_1 = e_1, y_2 = e_2 + k e_1 with k = (1 - g l_1 - λ)/T, g the middle gain.
+        reach: R with |y| <= R. Length 2.
+        position: Bound on |x - x̂|.
+        speed: Bound on |x' - ŝ|.
+    """
+
+    pole: float
+    reach: tuple[float, float]
+    position: float
+    speed: float
+
+
+def sampled_bounds(
+    observer: SampledObserver, *, noise: float, acceleration: float, initial: float
+) -> ObserverProof | None:
+    """Bounds on the errors of the sampled observer, from a comparison system as in `sampled.py`.
+
+    Args:
+        observer: Its gains.
+        noise: Bound on the encoder's error, quantisation included.
+        acceleration: Bound on |x'' - a|, between the samples too.
+        initial: Bound on |x' - ŝ| at the start, where x̂ is the first measurement.
+
+    Returns:
+        The bounds; None where the observer does not contract for all values of its adaptive scalar.
+
+    Not guaranteed: tightness where the adaptive scalar may move far, or the poles are complex.
+    """
+    t, middle, spread = observer.period, 1 + observer.largest / 2, observer.largest / 2
+    trace = 2 - middle * observer.first
+    product = 1 - middle * observer.first + t * middle * observer.second
+    pole = _decimal(trace / 2 + math.sqrt(max(trace**2 / 4 - product, 0.0)))
+    k = (1 - middle * observer.first - pole) / t
+    inward = np.array([observer.first, observer.second + k * observer.first])
+    nominal = np.array([[1 - middle * observer.first - k * t, t], [0.0, 0.0]])
+    nominal[1] = [-(middle * observer.second + k * middle * observer.first) + k - k * (1 + k * t), 1 + k * t]
+    moving = np.abs(nominal)
+    moving[:, 0] += spread * np.abs(inward)
+    push = (1 + observer.largest) * noise * np.abs(inward)
+    push += acceleration * t * np.array([t / 2, 1 + abs(k) * t / 2])
+    if not float(np.max(np.abs(np.linalg.eigvals(moving)))) < 1 - 1e-9:
+        return None
+    start = np.array([noise, initial + abs(k) * noise])
+    reach = np.linalg.solve(np.eye(2) - moving, push * (1 + 1e-6))
+    # a start outside grows the set along a direction in which it still contracts
+    widest = float(np.max(start / reach, initial=1.0))
+    reach = reach * widest * (1 + 1e-6)
+    return ObserverProof(
+        pole=pole, reach=(float(reach[0]), float(reach[1])), position=float(reach[0]),
+        speed=float(reach[1] + abs(k) * reach[0]) * (1 + 1e-9),
+    )  # fmt: skip
+
+
+def _decimal(value: float) -> float:
+    """Nine digits: what a file carries as a short rational."""
+    return float(f"{value:.8e}")

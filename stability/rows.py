@@ -92,6 +92,12 @@ class Builder:
             self.inputs[f"nominal.{name}"] = self.symbols.constant(Interval(number), name)
         for name, interval in {**bounds.parameters, **bounds.disturbances}.items():
             self.inputs[name] = self.symbols.constant(interval, name)
+        for name, (value, _) in bounds.feedforward.items():
+            symbol = f"w:{name}"
+            self.symbols.ranges[symbol] = value
+            self.inputs[f"nominal.{name}"] = self.symbols.value(f"nominal.{name}", Form.of(symbol))
+            beside = Form.of(symbol) + Form(constant=bounds.disturbances[name])
+            self.inputs[name] = self.symbols.value(name, beside)
         for k in range(4):
             self.inputs[f"r{k}"] = self.symbols.value(f"r{k}", Form.of(f"r{k}"))
         self.noise: dict[int, float] = {}
@@ -203,6 +209,7 @@ class Builder:
     ) -> tuple[list[Form], dict[int, Form]]:
         tangents = {row.state: rates[i] for i, row in enumerate(self.model.rows)}
         tangents.update({f"r{k}": Form.of(f"r{k + 1}") for k in range(3)})
+        tangents.update({f"nominal.{n}": Form(constant=rate) for n, (_, rate) in self.bounds.feedforward.items()})
         ranges = self._ranges()
         rows: list[Form] = []
         virtual: dict[int, Form] = {}

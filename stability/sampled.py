@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from .certificate import Certificate, Failure
 from .deviation import DeviationRows, deviation_rows
 from .model import Bounds, Gains, LoopModel
-from .period import Map, comparison, coordinates
+from .period import Map, comparison, coordinates, nominal
 
 Array = NDArray[np.float64]
 
@@ -293,6 +293,25 @@ def rates(rows: DeviationRows, radii: Array, held: Array) -> Array:
     size = np.maximum(np.abs(rows.low), np.abs(rows.high)) @ radii
     size = size + np.maximum(np.abs(rows.input_low), np.abs(rows.input_high)) @ held + rows.disturbance
     return size / rows.mass_low
+
+
+def speeds(rows: DeviationRows, found: Sampled, period: float) -> Array:
+    """Bounds on |z_i'| for all t, from the coordinates y of the certificate. Shape (n,).
+
+    ``z' = (M0/M) (a z(t) + b v + d)`` with ``v = -K z(t_k) + noise + drift``: the state at the last sample enters through
+    a - bK, so what the feedback balances is not counted twice, as over the box (`rates`) it would be.
+    """
+    best = np.zeros(len(found.radii))
+    for part, cell in zip(cells_of(rows, found.split), found.cells, strict=True):
+        at, image = nominal(part), comparison(part, period, cell.transform)
+        back, plain = image.inverse, rates(part, found.radii, found.held)
+        here = np.abs(back) @ cell.start
+        moved = np.minimum(image.motion[0] @ cell.start + image.motion[1], period / 2 * plain)
+        shaken = part.noise + period * part.drift + at.k_spread @ here
+        size = np.abs((at.a - at.b @ at.k) @ back) @ cell.start + np.abs(at.a) @ moved + at.a_spread @ (here + moved)
+        size = size + np.abs(at.b) @ shaken + at.b_spread @ found.held + part.disturbance / at.mass
+        best = np.maximum(best, np.minimum((1 + at.inertia) * size, plain))
+    return best
 
 
 def rounded(matrix: Array) -> Array:

@@ -16,6 +16,7 @@ Source: Heydari Shahna (2025), ch. 4, and P-1, P-4; sampled form derived here.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -101,7 +102,10 @@ class RAC:
         at_reference = ca.vertcat(r[0], r[1], *[0] * (len(self.rows) - 2))
         return self.plant.demand(i, r[2], x=at_reference, w=load, p=ca.vertcat(*known))
 
-    def step(self, x: Any, r: Any, theta: Any, gains: Any, nominal: Any, load: Any, period: float) -> Any:
+    def step(
+        self, x: Any, r: Any, theta: Any, gains: Any, nominal: Any, load: Any, period: float, *,
+        given: Mapping[int, Any] | None = None,
+    ) -> Any:  # fmt: skip
         """One control period, as expressions.
 
         Args:
@@ -112,6 +116,7 @@ class RAC:
             nominal: Nominal parameters.
             load: Nominal disturbances.
             period: Control period, s.
+            given: Virtual controls that another law sets in place of this one's, by row.
 
         Returns:
             (u, theta after the period, Q): inputs inside the amplitude limit, shape (m,); shape (k,); errors of the
@@ -119,7 +124,7 @@ class RAC:
         """
         import casadi as ca
 
-        virtual, errors = self.virtual_controls(x, r, theta, gains, nominal, load)
+        virtual, errors = self.virtual_controls(x, r, theta, gains, nominal, load, given)
         adapted = []
         for k, error in enumerate(errors):
             _, epsilon, delta, sigma = (gains[k, column] for column in range(4))
@@ -130,7 +135,14 @@ class RAC:
         return limited, ca.vertcat(*adapted), ca.vertcat(*errors)
 
     def virtual_controls(
-        self, x: Any, r: Any, theta: Any, gains: Any, nominal: Any, load: Any
+        self,
+        x: Any,
+        r: Any,
+        theta: Any,
+        gains: Any,
+        nominal: Any,
+        load: Any,
+        given: Mapping[int, Any] | None = None,
     ) -> tuple[dict[int, Any], list[Any]]:
         """κ_i by row, and Q_i of the governed rows, before the amplitude limit; arguments as in `step`."""
         terms = self.terms(x, r, nominal, load)
@@ -141,6 +153,8 @@ class RAC:
             goal = r[0] if target == "reference" else 0 if target == "zero" else virtual[int(target)]
             errors.append(x[i] - goal)
             virtual[i] = -(gains[k, 0] + gains[k, 1] * theta[k]) * errors[-1] / 2 + terms[k]
+            if given is not None and i in given:
+                virtual[i] = given[i]
         return virtual, errors
 
     def step_function(self, period: float) -> Any:

@@ -111,7 +111,8 @@ def tool(w: Any) -> tuple[Any, Any]:
     """Horizontal and vertical position of the tool, m, at joint coordinates (w1, w2, w3)."""
     import casadi as ca
 
-    c1, s1, c12, s12 = ca.cos(w[0]), ca.sin(w[0]), ca.cos(w[0] + w[1]), ca.sin(w[0] + w[1])
+    c1, s1, c2, s2 = ca.cos(w[0]), ca.sin(w[0]), ca.cos(w[1]), ca.sin(w[1])
+    c12, s12 = c1 * c2 - s1 * s2, s1 * c2 + c1 * s2
     reach = TOOL[0] + w[2]
     across = BASE[0] + ELBOW[0] * c1 - ELBOW[1] * s1 + reach * c12 - TOOL[1] * s12
     up = BASE[1] + ELBOW[0] * s1 + ELBOW[1] * c1 + reach * s12 + TOOL[1] * c12

@@ -133,6 +133,36 @@ def levers(w: Any) -> Any:
     return ca.vertcat(LIFT.lever(w[0]), TILT.lever(w[1]), 1)
 
 
+def joints_of(x: Any) -> Any:
+    """Joint coordinates at strokes of the actuators, rad, rad, m. Shape (3,)."""
+    import casadi as ca
+
+    return ca.vertcat(LIFT.coordinate(x[0]), TILT.coordinate(x[1]), x[2])
+
+
+def rod_forces(x: Any, v: Any, a: Any, payload: Any = 0.0) -> Any:
+    """Forces that the actuators must exert on their rods, N, in coordinates of the rods.
+
+    Args:
+        x: Strokes, m; symbols or numbers. Shape (3,).
+        v: Their rates, m/s.
+        a: Their accelerations, m/s².
+        payload: Point mass at the tool, kg, beside the end mass.
+
+    Returns:
+        SX column. Shape (3,). An actuator's own rotor, screw and friction are not in it.
+    """
+    import casadi as ca
+
+    x, v, a = ca.SX(x), ca.SX(v), ca.SX(a)
+    w, rate = ca.SX.sym("w", 3), ca.SX.sym("rate", 3)
+    lever = levers(w)
+    gain = (a - ca.jtimes(lever, w, rate) * rate) / lever
+    forces = joint_torques(w, rate, gain, payload) / lever
+    joints = joints_of(x)
+    return ca.substitute([forces], [w, rate], [joints, v / levers(joints)])[0]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Drives:
     """What the EMLAs of the crane do in a motion.

@@ -51,6 +51,7 @@ class Plant:
         limits: Limits on signals; the first is the amplitude limit of the input.
         stroke: Admissible range of the first state.
         outputs: Further signals for reports, by name: expressions of x, u, w, p.
+        load_unit: Unit of the disturbances.
     """
 
     name: str
@@ -73,6 +74,7 @@ class Plant:
     limits: tuple[Limit, ...]
     stroke: tuple[float, float]
     outputs: Mapping[str, Any]
+    load_unit: str = "N"
 
     @property
     def rate(self) -> Any:

@@ -105,8 +105,10 @@ def _mechanics(v: Any, torque: Any, load: Any, q: Mapping[str, Any]) -> tuple[An
     force = load + q["coulomb_friction"] * ca.tanh(v / q["friction_speed"])
     direction = ca.tanh(force * v / q["power_scale"])
     loss = direction * (q["screw_friction"] / q["lead_angle_tangent"] + q["gear_loss"])
-    driving = torque - q["viscous_friction"] * (v / r) - r * (1 + loss) * force
-    return mass, driving / (1 + loss * (r * q["load_mass"] / mass))
+    driving = torque - q["viscous_friction"] * (v / r) - r * force - r * (loss * force)
+    # what is lost stands apart, so that in a proof the rest cancels against the law term by term
+    slowed = loss * (r * q["load_mass"] / mass)
+    return mass, driving - driving * (slowed / (1 + slowed))
 
 
 def shaft_torque(force: Any, speed: Any, acceleration: Any, values: Mapping[str, Any]) -> Any:
