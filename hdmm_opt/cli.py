@@ -91,12 +91,33 @@ def _options(jobs: int, cluster: str | None, seed: int | None, resume: bool, bud
 @click.argument("study")
 @click.option("-o", "output", type=click.Path(path_type=Path), help="Gain file to write; STUDY.gains.json by default.")
 @click.option("--report", type=click.Path(path_type=Path, file_okay=False), help="Folder for an HTML report.")
+@click.option(
+    "--exchange",
+    nargs=2,
+    type=(click.Path(path_type=Path, exists=True), str),
+    metavar="FILE JOINT",
+    help="For a machine: take FILE's proofs, and prove anew only JOINT, whose actuator is another in STUDY.",
+)
 @_work
-def design(study: str, output: Path | None, report: Path | None, **work: Any) -> None:
+def design(
+    study: str, output: Path | None, report: Path | None, exchange: tuple[Path, str] | None, **work: Any
+) -> None:
     """Design gains for STUDY, a bundled name or a TOML file: reference, gains, proof, validation, gain file."""
     from .commands import run_design
 
-    sys.exit(run_design(study, output, report, _options(**work)))
+    sys.exit(run_design(study, output, report, _options(**work), exchange))
+
+
+@main.command()
+@click.argument("study")
+@click.option("-o", "output", type=click.Path(path_type=Path), help="JSON file for gains and figures of all.")
+@_work
+def compare(study: str, output: Path | None, **work: Any) -> None:
+    """Compare the law with its rivals on STUDY, a machine: equal tuning budget, same scenarios, same inner loops."""
+    from .machine_commands import run_compare
+    from .study import load_any
+
+    sys.exit(run_compare(load_any(study), output, _options(**work)))
 
 
 @main.command()

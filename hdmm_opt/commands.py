@@ -19,6 +19,7 @@ from .cli import NOT_PROVED, PROVED
 from .errors import DefectError, InvalidInputError
 from .files import check_writable, write_text
 from .gain_file import ball_of, gains_of, reference_of
+from .machine_study import MachineStudy
 from .problem import Problem, assemble, study_of
 from .progress import bar
 from .selection import Options
@@ -29,13 +30,25 @@ from .state import State
 QUICK_TRADEOFF = (32, 25)
 
 
-def run_design(name: str, output: Path | None, report: Path | None, options: Options) -> int:
+def run_design(
+    name: str, output: Path | None, report: Path | None, options: Options, exchange: tuple[Path, str] | None = None
+) -> int:
     """`hdmm-opt design`."""
-    chosen = study.load(name)
+    chosen = study.load_any(name)
     target = Path(f"{chosen.study.name}.gains.json") if output is None else output
     if target.suffix != ".json":
         raise InvalidInputError(f"a gain file is named .json: got {target}; give -o another name")
     check_writable(target)
+    if isinstance(chosen, MachineStudy):
+        if report is not None:
+            raise InvalidInputError("--report is made for one actuator so far: leave it out; notebooks show machines")
+        from .machine_commands import run_machine_design
+
+        state = target.with_name(f".{target.name}.state")
+        return run_machine_design(chosen, target, replace(options, state=state), exchange)
+    if exchange is not None:
+        raise InvalidInputError("--exchange is for a machine of several joints: leave it out for one actuator")
+    chosen = study.load(name)
     rejected = target.with_name(target.name.removesuffix(".json").removesuffix(".gains") + ".rejected.json")
     state = target.with_name(f".{target.name}.state")
     if report is not None:
@@ -113,6 +126,11 @@ def _summary(result: pipeline.Design) -> None:
 
 def run_simulate(path: Path, name: str | None, csv_path: Path | None, as_json: bool) -> int:
     """`hdmm-opt simulate`."""
+    document = gain_file.read(path)
+    if _of_machine(document):
+        from .machine_commands import run_machine_simulate
+
+        return run_machine_simulate(path, document, name, csv_path, as_json)
     problem, gains, offered = _from_file(path)
     if name is not None and name not in offered:
         raise InvalidInputError(f'{path}: no scenario "{name}"; {study.nearest(name, offered)}')
@@ -142,6 +160,12 @@ def run_simulate(path: Path, name: str | None, csv_path: Path | None, as_json: b
     for line in missed:
         click.echo(f"requirement missed: {line}", err=True)
     return NOT_PROVED if missed else PROVED
+
+
+def _of_machine(document: dict[str, Any]) -> bool:
+    """Whether a file is that of a machine of several joints."""
+    plant = document["study"]["plant"]
+    return "joints" in document or plant.get("model") in ("arm", "crane")
 
 
 def _from_file(path: Path) -> tuple[Problem, tuple[Any, ...], dict[str, tuple[ClosedLoop, Scenario]]]:
@@ -190,6 +214,10 @@ def run_falsify(path: Path, budget: int, seed: int, *, jobs: int = 1, resume: bo
     if report.status != PROVED:
         raise InvalidInputError(f"{path}: {report.message}; only a proved file can be attacked")
     document = gain_file.read(path)
+    if _of_machine(document):
+        raise InvalidInputError(
+            f"{path}: falsify attacks files of one actuator so far: got a machine; use simulate, or draws in design"
+        )
     problem, gains, offered = _from_file(path)
     job = {"falsify": document["sha256"], "budget": budget, "seed": seed}
     state = State(path.with_name(f".{path.name}.falsify.state"), job, resume=resume)
@@ -277,7 +305,11 @@ def run_tradeoff(name: str, output: Path | None, options: Options) -> int:
 def study_row(name: str) -> dict[str, str]:
     """What `hdmm-opt studies` says of a bundled study."""
     chosen = study.load_any(name)
-    if not isinstance(chosen, study.Study):
+    if isinstance(chosen, MachineStudy):
+        machine = f"{chosen.plant.model} ({len(chosen.joints)} joints)"
+        kind = " model-based" if chosen.controller.modelling else " model-free"
+        law = f"{chosen.controller.law}{kind}, {chosen.controller.rate_hz:g} Hz"
+    elif not isinstance(chosen, study.Study):
         machine, law = chosen.plant.model, f"no law: {chosen.reference.kind} motion"
     else:
         machine = f"{chosen.plant.model} ({chosen.plant.level})"
@@ -293,6 +325,10 @@ def run_trajectory(name: str, output: Path | None) -> int:
     chosen = study.load_any(name)
     if output is not None:
         check_writable(output)
+    if isinstance(chosen, MachineStudy):
+        from .machine_commands import run_machine_trajectory
+
+        return run_machine_trajectory(chosen, output)
     if not isinstance(chosen, study.Study):
         return _run_motion(chosen, output)
     problem = assemble(chosen)

@@ -23,7 +23,6 @@ from .gain_file import (
     gains_data,
     prove,
     reference_data,
-    seal,
     short,
 )
 from .machine_loop import MachineLoop
@@ -46,8 +45,9 @@ def resolved_machine(problem: MachineProblem) -> dict[str, Any]:
         measured = {} if problem.observer else {"position": noise.position, "speed": noise.speed}
         currents = dict.fromkeys(axis.plant.states[2:], noise.current_a)
         data["uncertainty"]["axes"][name] = {
-            "noise": {**measured, **currents}, "initial": dict(zip(axis.plant.states, axis.bounds.initial, strict=True)),
-        }  # fmt: skip
+            "noise": {**measured, **currents},
+            "initial": dict(zip(axis.plant.states, axis.bounds.initial, strict=True)),
+        }
     data["assumed"] = list(assumed(problem))
     return data
 
@@ -226,11 +226,3 @@ def golden_vectors(problem: MachineProblem, gains: Mapping[str, tuple[Gains, ...
             vectors.append({key: [float(v) for v in values] for key, values in entry.items()})
         found[name] = vectors
     return found
-
-
-def taken(document: Mapping[str, Any], joint: str) -> dict[str, Any]:
-    """The gain file of one joint out of that of a machine."""
-    return dict(document["joints"][joint])
-
-
-__all__ = ["assumed", "build_machine", "golden_vectors", "joint_document", "resolved_machine", "seal", "taken"]

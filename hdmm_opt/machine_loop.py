@@ -14,6 +14,7 @@ from stability import Gains
 
 from .control import gain_columns
 from .machine_problem import MachineProblem
+from .plants.rigid_joint import healthy
 from .simulation import Batch, Engine, Fault, Yardstick
 from .simulation.coupled import Coupled, compose_machine
 
@@ -196,7 +197,7 @@ class MachineLoop:
                   for name, plant in zip(machine.joints, machine.plants, strict=True)),
                 *([] if self.outer is None else [np.asarray(tuned[number] if tuned else ())]),
             ]))  # fmt: skip
-        states, governed, inputs, further = self.loop.sizes
+        _, governed, inputs, further = self.loop.sizes
         start = self._start(shared[0])
         n = len(machine.joints)
         z = np.zeros((governed + 2 * inputs + 3 * n + further, len(runs)))
@@ -230,12 +231,13 @@ class MachineLoop:
         return np.concatenate(parts)
 
     def _values(self, k: int, scenario: MachineScenario) -> Array:
+        """Parameters of a joint: nominal where a scenario does not say otherwise, actuators healthy."""
         name, plant = self.problem.machine.joints[k], self.problem.machine.plants[k]
-        given = scenario.parameters
-        return np.array([
-            p.value * (1 + p.tolerance * given.get(f"{name}.{key}", given.get(key, 0.0)))
-            for key, p in plant.parameters.items()
-        ])  # fmt: skip
+        given, values = scenario.parameters, []
+        for key, p in plant.parameters.items():
+            usual = healthy(p) if key == "effectiveness" else 0.0
+            values.append(p.value * (1 + p.tolerance * given.get(f"{name}.{key}", given.get(key, usual))))
+        return np.array(values)
 
     def _figures(self, found: dict[str, float], lost: float) -> MachineFigures:
         problem, joints = self.problem, self.problem.machine.joints
@@ -250,19 +252,26 @@ class MachineLoop:
         def rms(sums: tuple[float, ...], size: int) -> tuple[float, ...]:
             return tuple(math.sqrt(value / size) for value in sums)
 
+        def sound(values: tuple[float, ...]) -> tuple[float, ...]:
+            return (math.inf,) * len(values) if gone else values
+
+        left = found["tool"] > self.loop.yardstick.band and found["outside"] >= 0
         watched = problem.observer is not None
-        outside = found["outside"]
         return MachineFigures(
-            tool=math.inf if gone else found["tool"], tool_late=math.inf if gone else found["tool late"],
+            tool=math.inf if gone else found["tool"],
+            tool_late=math.inf if gone else found["tool late"],
             tool_rms=math.inf if gone else math.sqrt(found["tool squares"] / late),
-            settling=math.inf if gone else outside + period if outside >= 0 and found["tool"] > self.loop.yardstick.band else 0.0,
+            settling=math.inf if gone else found["outside"] + period if left else 0.0,
             itae=math.inf if gone else found["tool itae"] * period,
-            joints=(math.inf,) * len(joints) if gone else each("late"), joints_ever=(math.inf,) * len(joints) if gone else each("error"),
-            joints_rms=(math.inf,) * len(joints) if gone else rms(each("squares"), late),
-            torques=each("torque"), torques_rms=rms(each("torque squares"), ticks), uses=each("use"),
+            joints=sound(each("late")),
+            joints_ever=sound(each("error")),
+            joints_rms=sound(rms(each("squares"), late)),
+            torques=each("torque"),
+            torques_rms=rms(each("torque squares"), ticks),
+            uses=each("use"),
             estimates=tuple(zip(each("estimated position"), each("estimated speed"), strict=True)) if watched else (),
             lost=lost,
-        )  # fmt: skip
+        )
 
 
 def _substeps(problem: MachineProblem) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stability import Bounds, Failure, Gains, Interval, certify_sampled
+from stability import Bounds, Failure, Gains, Interval, certify_sampled, tangents_many
 from stability.coupling import Loads, Slices, Tube
 from stability.network import Contract, Subsystem, compose
 from stability.observer import SampledObserver, sampled_bounds
@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 
 #: How often each piece of the reference is halved into slices of time.
 HALVINGS = 1
+#: Loads are assumed this much larger than they come out here: the checker encloses them in another arithmetic.
+SPARE = 1.005
 #: Significant digits of the inertia that an axis' own model carries.
 DIGITS = 3
 
@@ -82,7 +84,7 @@ class MachineProblem:
         for name, axis, tube, size in zip(self.machine.joints, self.axes, tubes, sizes, strict=True):
             middle = Interval(0.0) if self.foreseeing else axis.bounds.disturbances["load_force"]
             found[name] = replace(
-                axis.bounds, disturbances={"load_force": middle + Interval.symmetric(size)},
+                axis.bounds, disturbances={"load_force": middle + Interval.symmetric(SPARE * size)},
                 noise=self._noise(axis, tube),
             )  # fmt: skip
         return found
@@ -200,8 +202,8 @@ def _observer(study: MachineStudy) -> SampledObserver | None:
     observer = SampledObserver.of_bandwidth(section.bandwidth_rad_s, section.largest, 1 / study.controller.rate_hz)
     if sampled_bounds(observer, noise=0.0, acceleration=1.0, initial=0.0) is None:
         raise InvalidInputError(
-            f"controller.observer must contract for every value of its adaptive scalar: {section.bandwidth_rad_s:g} rad/s "
-            f"with largest = {section.largest:g} at {study.controller.rate_hz:g} Hz is not proved to; lower one of them"
+            f"controller.observer must contract for every adaptive scalar: got {section.bandwidth_rad_s:g} "
+            f"rad/s with largest = {section.largest:g} at {study.controller.rate_hz:g} Hz; lower one of them"
         )
     return observer
 
@@ -211,11 +213,13 @@ def _own(machine: Machine, slices: Slices, payload: Interval) -> tuple[float, ..
     n = len(machine.joints)
     forces = machine.forces
     middle = (slices.low + slices.high)[0] / 2
-    found = np.array([
-        [float(forces(x, [0.0] * n, np.eye(n)[j], payload.high)[j]) - float(forces(x, [0.0] * n, [0.0] * n, payload.high)[j])
-         for j in range(n)]
-        for x in middle.T
-    ])  # fmt: skip
+    still_there = [0.0] * n
+
+    def inertia(x: Array, j: int) -> float:
+        pushed, held = (forces(x, still_there, a, payload.high) for a in (np.eye(n)[j], still_there))
+        return float(pushed[j]) - float(held[j])
+
+    found = np.array([[inertia(x, j) for j in range(n)] for x in middle.T])
     return tuple(float(f"{v:.{DIGITS}g}") for v in (found.min(axis=0) + found.max(axis=0)) / 2)
 
 
@@ -359,17 +363,16 @@ def sliced(references: tuple[Reference, ...]) -> Slices:
     return parts
 
 
-def tool_errors(problem: MachineProblem, radii: Array, *, refine: Callable[[Array], Array] | None = None) -> float:
+def tool_errors(problem: MachineProblem, radii: Array) -> float:
     """Bound on the distance of the tool from its reference while |x_i - r_i| <= radii_i, m."""
-    from stability import tangents_many
-
-    n = len(radii)
-    ranges = {f"x{j}": (problem.slices.low[0, j] - radii[j], problem.slices.high[0, j] + radii[j]) for j in range(n)}
-    one = (np.ones(problem.slices.low.shape[2]),) * 2
-    along = tangents_many(problem.machine.tool_expression, ranges, {f"x{j}": {f"x{j}": one} for j in range(n)})
-    squared = np.zeros_like(one[0])
+    reference = problem.slices.low[0], problem.slices.high[0]
+    ranges = {f"x{j}": (reference[0][j] - radius, reference[1][j] + radius) for j, radius in enumerate(radii)}
+    unit = np.ones(problem.slices.low.shape[2])
+    along = tangents_many(problem.machine.tool_expression, ranges, {name: {name: (unit, unit)} for name in ranges})
+    squared = np.zeros_like(unit)
     for coordinate in along:
-        size = sum((np.maximum(np.abs(v[0]), np.abs(v[1])) * radii[int(k[1:])] for k, v in coordinate.items()),
-                   np.zeros_like(one[0]))  # fmt: skip
+        size = np.zeros_like(unit)
+        for name, (low, high) in coordinate.items():
+            size = size + np.maximum(np.abs(low), np.abs(high)) * radii[int(name[1:])]
         squared = squared + size**2
     return float(np.sqrt(squared.max()) * (1 + 1e-9))

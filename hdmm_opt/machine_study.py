@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from .plants import defaults
 from .plants.crane_dynamics import JOINTS
 from .study import (
+    RESERVED,
     FaultSection,
     GainSection,
     NonNegative,
@@ -28,7 +29,7 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,31}$")]
 class DriveSection(Section):
     """The actuator of one joint: parameters of an EMLA, or what an arm's joint is driven by."""
 
-    parameters: dict[str, ParameterSection] = {}
+    parameters: dict[str, ParameterSection] = Field(default_factory=dict)
     armature: ParameterSection | None = None
     torque: ParameterSection | None = None
     speed_limit: Positive | None = None
@@ -42,9 +43,9 @@ class MachineSection(Section):
     urdf: str | None = None
     tip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     damping: NonNegative = 0.1
-    parameters: dict[str, ParameterSection] = {}
-    joints: dict[Name, DriveSection] = {}
-    locked: dict[Name, float] = {}
+    parameters: dict[str, ParameterSection] = Field(default_factory=dict)
+    joints: dict[Name, DriveSection] = Field(default_factory=dict)
+    locked: dict[Name, float] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _fitting(self) -> MachineSection:
@@ -144,7 +145,7 @@ class MotionSection(Section):
             raise ValueError("|waypoints|must all have one entry for each joint|complete them")
         if self.kind == "quintic" and len(self.durations_s) != moves:
             raise ValueError(
-                f"|durations_s|must give one duration for each of the {moves} moves: got {len(self.durations_s)}|list them"
+                f"|durations_s|needs one duration for each of the {moves} moves: got {len(self.durations_s)}|list them"
             )
         if self.kind == "bspline" and self.durations_s:
             raise ValueError("|durations_s|has no place in a minimum-time motion|remove it; pace makes it slower")
@@ -168,8 +169,8 @@ class MachineControllerSection(Section):
     law: Literal["rac"]
     modelling: tuple[Literal["mechanics", "resistance", "back_emf", "decoupling"], ...] = ()
     rate_hz: Annotated[float, Field(gt=0, le=1e5)]
-    gains: dict[str, GainSection] = {}
-    joints: dict[Name, dict[str, GainSection]] = {}
+    gains: dict[str, GainSection] = Field(default_factory=dict)
+    joints: dict[Name, dict[str, GainSection]] = Field(default_factory=dict)
     observer: ObserverSection | None = None
 
 
@@ -185,10 +186,10 @@ class MachineScenarioSection(Section):
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
     payload_kg: NonNegative | None = None
-    parameters: dict[str, Share] = {}
+    parameters: dict[str, Share] = Field(default_factory=dict)
     noise: Annotated[float, Field(ge=0, le=1)] = 0.0
     quantisation: Annotated[float, Field(ge=0, le=1)] = 0.0
-    faults: dict[Name, FaultSection] = {}
+    faults: dict[Name, FaultSection] = Field(default_factory=dict)
 
 
 class MachineValidationSection(Section):
@@ -246,8 +247,11 @@ class MachineStudy(Section):
         low, high = self.uncertainty.payload_kg
         names = [scenario.name for scenario in self.validation.scenarios]
         for scenario in self.validation.scenarios:
-            if names.count(scenario.name) > 1:
-                raise ValueError("|validation.scenarios|needs names of its own: got one twice|rename that scenario")
+            if names.count(scenario.name) > 1 or scenario.name in RESERVED:
+                reason = (
+                    "one twice" if names.count(scenario.name) > 1 else f"{scenario.name}, which hdmm-opt uses itself"
+                )
+                raise ValueError(f"|validation.scenarios|needs names of its own: got {reason}|rename that scenario")
             if scenario.payload_kg is not None and not low <= scenario.payload_kg <= high:
                 raise ValueError(
                     f"|validation.scenarios.{scenario.name}.payload_kg|must be inside uncertainty.payload_kg "

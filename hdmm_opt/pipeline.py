@@ -102,8 +102,8 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
         return _refused(problem, gains)
     document, missed = _validated(problem, gains, found, effort, seed, options, state, progress)
     progress.stage("exact check")
-    provenance = _provenance(seed, options, spent, begun)
-    finished, report = gain_file.prove({**document, "provenance": provenance})
+    made = provenance(seed, options, spent, begun)
+    finished, report = gain_file.prove({**document, "provenance": made})
     verdicts = tuple(_from_checker(report))
     accepted = report.status == 0 and not missed
     notes = (compared(problem, gains, tried, found), _rates(problem, gains)) if accepted else ()
@@ -202,7 +202,8 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _provenance(seed: int, options: Options, spent: dict[str, int], begun: float) -> dict[str, Any]:
+def provenance(seed: int, options: Options, spent: dict[str, int], begun: float) -> dict[str, Any]:
+    """The `provenance` section of a gain file."""
     packages = ("hdmm-opt", "casadi", "cvxpy", "clarabel", "llvmlite", "numpy", "scipy")
     return {
         "versions": {"python": platform.python_version(), **{name: _version(name) for name in packages}},

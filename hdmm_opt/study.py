@@ -17,6 +17,7 @@ from .errors import InvalidInputError
 from .plants import Parameter, defaults
 
 if TYPE_CHECKING:
+    from .machine_study import MachineStudy
     from .motion_study import MotionStudy
 
 T = TypeVar("T", bound=BaseModel)
@@ -312,6 +313,11 @@ def load(name: str) -> Study:
         InvalidInputError: one line with the rule, what came, and what would do.
     """
     found = load_any(name)
+    if hasattr(found, "controller") and not isinstance(found, Study):
+        raise InvalidInputError(
+            f"{name}: this verb is for studies of one actuator: got a machine of several joints; use design, check, "
+            "simulate, trajectory or compare"
+        )
     if not isinstance(found, Study):
         raise InvalidInputError(
             f'{name}: a design needs a controller: this study is of a motion alone; use "hdmm-opt trajectory {name}"'
@@ -319,8 +325,8 @@ def load(name: str) -> Study:
     return found
 
 
-def load_any(name: str) -> Study | MotionStudy:
-    """Read a study of a design, or of a motion alone; as `load`."""
+def load_any(name: str) -> Study | MotionStudy | MachineStudy:
+    """Read a study of a design of one axis or of a machine, or of a motion alone; as `load`."""
     if name in bundled():
         return parse((resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8"), name)
     path = Path(name)
@@ -335,14 +341,24 @@ def load_any(name: str) -> Study | MotionStudy:
         raise InvalidInputError(f"{path}: cannot read the study file: {reason}; check the path") from None
 
 
-def parse(text: str, where: str) -> Study | MotionStudy:
+def parse(text: str, where: str) -> Study | MotionStudy | MachineStudy:
     """Read a study from TOML text; `where` names it in errors."""
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InvalidInputError(f"{where}: not valid TOML: {error}; correct that line") from None
+    return parse_data(data, where)
+
+
+def parse_data(data: dict[str, Any], where: str) -> Study | MotionStudy | MachineStudy:
+    """Validate a study of any kind given as data; its machine and its sections tell the kind."""
     plant = data.get("plant")
-    if isinstance(plant, dict) and plant.get("model") == "crane":
+    model = plant.get("model") if isinstance(plant, dict) else None
+    if model == "arm" or (model == "crane" and "controller" in data):
+        from .machine_study import MachineStudy
+
+        return _validated(data, where, MachineStudy)
+    if model == "crane":
         from .motion_study import MotionStudy
 
         return _validated(data, where, MotionStudy)

@@ -1262,12 +1262,13 @@ class Period:
     def speeds(self, bound: list[Fraction]) -> list[Fraction]:
         """Bounds on |z_i'| for all t, in the box's unit a period, for |y| <= bound at the samples."""
         here = [dot(map(abs, row), bound) for row in self.back]
-        moved = [total - part for total, part in zip(self.states(bound), here, strict=True)]
+        total = self.states(bound)
+        moved = [whole - part for whole, part in zip(total, here, strict=True)]
         shaken = [n + d + dot(row, here) for n, d, row in zip(self.noise, self.drift, self.k_spread, strict=True)]
         found = []
         for i in range(self.n):
             size = dot(self.speed[i], bound) + dot(map(abs, self.a[i]), moved) + dot(map(abs, self.b[i]), shaken)
-            size += dot(self.a_spread[i], map(sum, zip(here, moved, strict=True))) + sum(self.b_spread[i], self.push[i])
+            size += dot(self.a_spread[i], total) + sum(self.b_spread[i], self.push[i])
             found.append(up(min((1 + self.change[i]) * size, 2 * self.half_way[i])))
         return found
 
@@ -1953,7 +1954,9 @@ class Machine:
         for part in self.slices:
             ranges = {f"x{j}": add(part[j][0], symmetric(radius)) for j, radius in enumerate(radii)}
             moved = derivatives(self.place, ranges, {name: {name: ONE} for name in ranges})
-            sizes = [sum((magnitude(v) * radii[int(name[1:])] for name, v in form.items()), ZERO[0]) for _, form in moved]
+            sizes = [
+                sum((magnitude(v) * radii[int(name[1:])] for name, v in form.items()), ZERO[0]) for _, form in moved
+            ]
             worst = max(worst, up(sum((size * size for size in sizes), ZERO[0])))
         return root(worst, True)
 

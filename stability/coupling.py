@@ -7,9 +7,9 @@ of its nominal value, the mean value theorem gives
     |w_i - w_i(r)| <= sup|∂F_i/∂x| X + sup|∂F_i/∂v| V + sup|∂F_i/∂a - m_i e_i| A + sup|∂F_i/∂p| P
 
 on every slice of time. The acceleration a is itself decided by the loads: where every actuator meets
-``|a_i - a_i'| <= s_i |w_i - w_i'|``, the loads are the only solution of their equations, and inside these bounds, if the
-matrix of ``sup|∂F_i/∂a_j - m_i e_i| s_j`` has a spectral radius below 1 (a contraction that maps the bounds into
-themselves). Products of masses and levers alone decide that.
+``|a_i - a_i'| <= s_i |w_i - w_i'|``, the loads are the only solution of their equations, and inside these bounds, if
+the matrix of ``sup|∂F_i/∂a_j - m_i e_i| s_j`` has a spectral radius below 1: a contraction that maps the bounds into
+themselves.
 """
 
 from __future__ import annotations
@@ -118,7 +118,8 @@ class Loads:
     def surprise(self, slices: Slices, tubes: Sequence[Tube]) -> tuple[list[float], Array]:
         """Bounds on |w_i - w_i(r)| while all joints keep their tubes, and on |∂F_i/∂a_j - m_i e_i|, shape (n, n)."""
         ranges = self._ranges(slices, tubes)
-        one = (np.ones_like(ranges[PAYLOAD][0]),) * 2
+        unit = np.ones_like(ranges[PAYLOAD][0])
+        one = unit, unit
         directions = {name: {name: one} for name in (*(f"{x}{j}" for x in "xva" for j in range(self.count)), PAYLOAD)}
         along = tangents_many(self.expression, ranges, directions)
         sizes, inertia = [], np.zeros((self.count,) * 2)

@@ -298,8 +298,8 @@ def rates(rows: DeviationRows, radii: Array, held: Array) -> Array:
 def speeds(rows: DeviationRows, found: Sampled, period: float) -> Array:
     """Bounds on |z_i'| for all t, from the coordinates y of the certificate. Shape (n,).
 
-    ``z' = (M0/M) (a z(t) + b v + d)`` with ``v = -K z(t_k) + noise + drift``: the state at the last sample enters through
-    a - bK, so what the feedback balances is not counted twice, as over the box (`rates`) it would be.
+    ``z' = (M0/M) (a z(t) + b v + d)`` with ``v = -K z(t_k) + noise + drift``: the state at the last sample enters
+    through a - bK, so what the feedback balances is not counted twice, as over the box (`rates`) it would be.
     """
     best = np.zeros(len(found.radii))
     for part, cell in zip(cells_of(rows, found.split), found.cells, strict=True):

@@ -71,3 +71,9 @@ def joint_parameters(kind: str, **values: Any) -> dict[str, Parameter]:
                         meaning=meaning)
         for name, (unit, meaning) in known.items()
     }  # fmt: skip
+
+
+def healthy(parameter: Parameter) -> float:
+    """The place of full effectiveness in the tolerance of that parameter, -1 … 1."""
+    spread = parameter.value * parameter.tolerance
+    return 0.0 if spread == 0 else (1.0 - parameter.value) / spread

@@ -152,7 +152,9 @@ def compose_machine(loop: Coupled, joints: Sequence[str]) -> System:
         alive = alive * (ca.fabs(error) < LOST)
     return System(
         x=x, z=z, shared=shared, own=ca.SX.sym("nothing", 0), draws=draws,
-        fixed=ca.vertcat(gains, *parameters, payload, noise, fault), t=t, tau=tau,
+        fixed=ca.vertcat(
+            gains, *parameters, payload, noise, fault, *([] if loop.outer is None else [loop.outer.symbols])
+        ), t=t, tau=tau,
         tasks=(Task(every=1, after=after),), rate=ca.vertcat(*rates), alive=alive, records=records,
         signals={"x": x, "u": commanded, "theta": theta, "watched": watched, "tool": place, "wanted": wanted},
         period=loop.period, substeps=loop.substeps,
@@ -220,15 +222,15 @@ def _control(
         else:
             seen.append(ca.vertcat(estimates[i][:2], sensed[2:]))
             following.append(_observed(loop, estimates[i], encoder, r[i][2]))
-    commands, inner = (None, further) if loop.outer is None else loop.outer.step(loop, seen, r, further)
+    loads = [foreseen[i] if loop.foreseeing else ca.SX(0) for i in range(n)]
+    commands, inner = (None, further) if loop.outer is None else loop.outer.step(loop, seen, r, loads, further)
     adapted, wanted, applied = [], [], []
     for i, law in enumerate(loop.laws):
         nominal = ca.DM(list(law.plant.values().values()))
         given = None if commands is None else {1: commands[i]}
-        load = foreseen[i] if loop.foreseeing else ca.SX(0)
         k = len(law.governed)
         u, step, _ = law.step(
-            seen[i], r[i], thetas[i], ca.reshape(columns[i], k, 4), nominal, load, loop.period, given=given
+            seen[i], r[i], thetas[i], ca.reshape(columns[i], k, 4), nominal, loads[i], loop.period, given=given
         )  # fmt: skip
         share = ca.if_else(t >= faults[i][1], faults[i][0] * (1 - ca.exp(-faults[i][2] * (t - faults[i][1]))), 0)
         adapted.append(step)
