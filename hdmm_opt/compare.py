@@ -161,9 +161,15 @@ def _outcome(problem: MachineProblem, shown: Sequence[MachineFigures]) -> Outcom
     )
 
 
-def table(found: Sequence[Contender], writes: Callable[[str], None]) -> None:
-    """Write the comparison as text: a line for each scenario and controller, the best figure marked."""
-    writes(f"{'scenario':18}{'controller':16}{'max [mm]':>10}{'RMS [mm]':>10}{'limit use':>11}{'certified [mm]':>16}")
+def table(found: Sequence[Contender], proved: Sequence[str], writes: Callable[[str], None]) -> None:
+    """Write the comparison as text: a line for each scenario and controller, the best figure marked.
+
+    Args:
+        found: The controllers.
+        proved: Scenarios inside the assumptions of the certificates.
+        writes: Called with each line.
+    """
+    writes(f"{'scenario':16}{'controller':17}{'max [mm]':>12}{'RMS [mm]':>13}{'limit use':>11}{'certified [mm]':>16}")
     for scenario in found[0].figures:
         best = min(c.figures[scenario].tool_rms for c in found)
         for c in found:
@@ -175,5 +181,5 @@ def table(found: Sequence[Contender], writes: Callable[[str], None]) -> None:
                 if sound
                 else f"{f'lost at {m.lost:.3g} s':>20}"
             )
-            bound = "" if c.certified is None else f"{1e3 * c.certified:.4g}"
-            writes(f"{scenario:18}{c.name:16}{size}{max(m.uses):11.3g}{bound:>16}")
+            bound = "" if c.certified is None or scenario not in proved else f"{1e3 * c.certified:.4g}"
+            writes(f"{scenario:16}{c.name:17}{size}{max(m.uses):11.3g}{bound:>16}")

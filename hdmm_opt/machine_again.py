@@ -12,8 +12,10 @@ from stability import Bounds, Gains, Interval
 from stability.coupling import Tube
 from stability.network import Contract, prove
 
+from .axis import Axis
 from .errors import InvalidInputError
 from .gain_file import gains_of, reference_of
+from .machine_file import resolved_machine
 from .machine_problem import MachineProblem, assemble_machine
 from .machine_study import MachineStudy
 from .study import parse_data
@@ -29,7 +31,31 @@ def machine_of(document: Mapping[str, Any]) -> tuple[MachineProblem, dict[str, t
     if "joints" not in document:
         return assemble_machine(study), _rejected_gains(document, study)
     references = tuple(reference_of(document["joints"][name]) for name in study.joints)
-    return assemble_machine(study, references), {name: gains_of(document["joints"][name]) for name in study.joints}
+    problem = assemble_machine(study, references)
+    _same_machine(document, problem)
+    return problem, {name: gains_of(document["joints"][name]) for name in study.joints}
+
+
+def _same_machine(document: Mapping[str, Any], problem: MachineProblem) -> None:
+    """Refuse a file whose machine is not the one that this release makes of its study.
+
+    The checker takes loads, tool and plants as given; here they are compared with the symbolic ones.
+    """
+    certificate = document["certificate"]
+    made = {
+        "study": resolved_machine(problem), "loads": problem.machine.expression.to_data(),
+        "tool": problem.machine.tool_expression.to_data(),
+    }  # fmt: skip
+    given = {"study": {k: v for k, v in document["study"].items() if k != "sha256"},
+             "loads": certificate["loads"], "tool": certificate["tool"]}  # fmt: skip
+    for name, axis in zip(problem.machine.joints, problem.axes, strict=True):
+        made[name] = axis.model.to_data()
+        given[name] = document["joints"][name]["certificate"]["model"]
+    for part, value in made.items():
+        if json.loads(json.dumps(value)) != given[part]:
+            raise InvalidInputError(
+                f"the {part} of this file is not what this release makes of its study; write it again with design"
+            )
 
 
 def study_of_machine(data: Mapping[str, Any]) -> MachineStudy:
@@ -42,7 +68,6 @@ def study_of_machine(data: Mapping[str, Any]) -> MachineStudy:
     for key in ("sha256", "ranges", "assumed"):
         plain.pop(key, None)
     plain["plant"].pop("axes", None)
-    plain["uncertainty"].pop("axes", None)
     found = parse_data(plain, "study")
     if not isinstance(found, MachineStudy):
         raise InvalidInputError("study: not that of a machine; give a file that design wrote for one")
@@ -62,8 +87,8 @@ def _rejected_gains(document: Mapping[str, Any], study: MachineStudy) -> dict[st
 
 def standing(
     document: Mapping[str, Any], study: MachineStudy, joint: str
-) -> tuple[MachineProblem, dict[str, tuple[Gains, ...]], dict[str, Contract]]:
-    """A machine with one other actuator: its problem, the standing gains, and the contracts that stand.
+) -> tuple[MachineProblem, dict[str, tuple[Gains, ...]], dict[str, Contract], Axis]:
+    """A machine with one other actuator: its problem, the standing gains and contracts, and the axis that is replaced.
 
     Args:
         document: The proved file of the machine.
@@ -97,7 +122,7 @@ def standing(
             found = prove(name, problem.subsystems(gains)[name], bounds)
         assert isinstance(found, Contract)
         contracts[name] = replace(found, promise=promises[name])
-    return problem, gains, contracts
+    return problem, gains, contracts, old.axes[study.joints.index(joint)]
 
 
 def stated_bounds(bounds: Bounds, document: Mapping[str, Any]) -> Bounds:

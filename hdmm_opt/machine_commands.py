@@ -242,7 +242,8 @@ def run_compare(study: Any, output: Path | None, options: Options) -> int:
     seed = study.tuning.seed if options.seed is None else options.seed
     with bar() as progress:
         found = compare(problem, budget, seed, replace(options, state=None), progress)
-    table(found, click.echo)
+    inside = [s.name for s in machine_scenarios(study) if covered(problem, s)]
+    table(found, inside, click.echo)
     each = budget[0] * (budget[1] + 1)
     click.echo(f"{each} candidates for each, on the same scenarios; * least RMS error of the tool", err=True)
     click.echo(f"assumed, to be replaced by yours: {', '.join(assumed(problem))}", err=True)

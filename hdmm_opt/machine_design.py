@@ -6,27 +6,30 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from stability import Failure, checker
+from stability import Failure, Gains, checker
 from stability.network import Contract, exchange
 
 from . import gain_file
+from .axis import Axis
 from .errors import DefectError
 from .machine_again import standing
 from .machine_file import assumed, build_machine, resolved_machine
 from .machine_gains import (
     GainSet,
     Tuned,
+    bandwidths,
     covered,
-    ladder,
     machine_scenarios,
     shortfall,
     starting_gains,
     tuned_gains,
     uses,
+    with_bandwidths,
 )
 from .machine_loop import MachineFigures, MachineLoop, MachineScenario
 from .machine_problem import MachineProblem, assemble_machine, tool_errors
@@ -150,8 +153,8 @@ def exchanged(
     """
     begun = time.perf_counter()
     progress.stage("reference")
-    problem, gains, contracts = standing(document, study, joint)
-    candidates = [rungs[joint] for rungs in _newcomers(problem)]
+    problem, gains, contracts, before = standing(document, study, joint)
+    candidates = _newcomers(problem, joint, (before, gains[joint]))
     best: Tuned | None = None
     least, why = math.inf, Failure(reason=f"{joint}: no gains keep the standing promise")
     progress.stage(f"gains of {joint}")
@@ -171,11 +174,18 @@ def exchanged(
     return _finished(problem, tuned, study.validation.monte_carlo, seed, options, progress, begun, kept=kept)
 
 
-def _newcomers(problem: MachineProblem) -> list[GainSet]:
+#: Bandwidths that are tried for an actuator that is exchanged, over those of the one before.
+NEARBY = (0.8, 1.0, 1.2, 1.5)
+
+
+def _newcomers(problem: MachineProblem, joint: str, before: tuple[Axis, tuple[Gains, ...]]) -> list[tuple[Gains, ...]]:
+    """Gains of an exchanged actuator with bandwidths near those of the one before."""
+    k = problem.machine.joints.index(joint)
+    old = bandwidths(*before)
+    factors = [(*part, *[part[-1]] * (len(old) - len(part))) for part in product(NEARBY, repeat=min(3, len(old)))]
     return [
-        ladder(problem, outer, (second, third))
-        for outer in (6.0, 8.0, 10.0, 13.0, 17.0, 22.0) for second in (6.0, 8.0, 10.0, 13.0) for third in (12.0, 20.0)
-    ]  # fmt: skip
+        with_bandwidths(problem.axes[k], before[1], [f * w for f, w in zip(row, old, strict=True)]) for row in factors
+    ]
 
 
 def validated_machine(

@@ -37,17 +37,8 @@ def resolved_machine(problem: MachineProblem) -> dict[str, Any]:
     """The study with every default filled in, as JSON data."""
     study, machine = problem.study, problem.machine
     data = study.model_dump(mode="json", exclude_none=True)
-    noise = study.uncertainty.noise
     data["plant"]["axes"] = {name: _plant(problem, k) for k, name in enumerate(machine.joints)}
     data["ranges"] = {name: _ranges(axis) for name, axis in zip(machine.joints, problem.axes, strict=True)}
-    data["uncertainty"]["axes"] = {}
-    for name, axis in zip(machine.joints, problem.axes, strict=True):
-        measured = {} if problem.observer else {"position": noise.position, "speed": noise.speed}
-        currents = dict.fromkeys(axis.plant.states[2:], noise.current_a)
-        data["uncertainty"]["axes"][name] = {
-            "noise": {**measured, **currents},
-            "initial": dict(zip(axis.plant.states, axis.bounds.initial, strict=True)),
-        }
     data["assumed"] = list(assumed(problem))
     return data
 
@@ -169,7 +160,7 @@ def build_machine(
             "tool": problem.machine.tool_expression.to_data(),
             "halvings": HALVINGS,
             "promises": {name: _promise(contracts[name].promise) for name in joints},
-            "envelope": {"tool": short(tool_errors(problem, balls * (1 + 1e-5)) * (1 + 1e-3), up=True)},
+            "envelope": {"tool": short(tool_errors(problem, balls * (1 + 1e-5)) * (1 + 1e-3) + 1e-12, up=True)},
         },
         "joints": documents,
         "obligations": [],

@@ -33,6 +33,8 @@ GainSet = dict[str, tuple[Gains, ...]]
 OUTER, RATIOS = (5.0, 10.0, 18.0), (8.0, 14.0)
 #: Step factors of the pattern search that improves the best of them.
 STEPS = (1.5, 1.2)
+#: A search goes this far from its start, as a share of the range of each gain on a logarithmic scale.
+REACH = 0.1
 #: Limits and requirements must hold with this relative room, so that the exact check agrees.
 HEADROOM = 2e-3
 #: Violations of gains that are proved alone but not together, and of gains that are not proved alone.
@@ -99,21 +101,33 @@ def ladder(problem: MachineProblem, outer: float, ratios: Sequence[float]) -> Ga
 
 def _rungs(axis: Axis, outer: float, ratios: Sequence[float]) -> tuple[Gains, ...]:
     quiet = axis.gains(np.array([1.0 if axis.ranges[i].name[0] == "s" else 0.0 for i in axis.searched]))
-    rows = error_rows(axis.model, axis.bounds, quiet, 1e-9 * axis.box, np.zeros(len(axis.model.inputs)))
-    made: list[Gains] = []
     widths: list[float] = []
-    for k, i in enumerate(axis.law.governed):
-        item, target = axis.ranges[4 * k], axis.law.rows[i].target
-        per_gain = (rows.control_gain[i] or 1.0) / (2 * rows.mass_high[i])  # none: an actuator that may be stuck
-        if not widths:
-            width = outer
-        else:
-            # a row that tracks nothing is as fast as the row before it
-            width = widths[-1] * (ratios[min(len(widths), len(ratios)) - 1] if isinstance(target, int) else 1.0)
-        beta = min(max(float(f"{width / per_gain:.4g}"), item.low), item.high)
-        made.append(replace(quiet[k], beta=beta))
-        widths.append(width)
+    for i in axis.law.governed:
+        # a row that tracks nothing is as fast as the row before it
+        follows = isinstance(axis.law.rows[i].target, int)
+        ratio = ratios[min(len(widths), len(ratios)) - 1] if widths and follows else 1.0
+        widths.append(widths[-1] * ratio if widths else outer)
+    return with_bandwidths(axis, quiet, widths)
+
+
+def bandwidths(axis: Axis, gains: tuple[Gains, ...]) -> list[float]:
+    """ω_i = g_i β_i / (2 M_i) of the governed rows at the largest inertia, 1/s."""
+    return [per * g.beta for per, g in zip(_per_gain(axis, gains), gains, strict=True)]
+
+
+def with_bandwidths(axis: Axis, gains: tuple[Gains, ...], widths: Sequence[float]) -> tuple[Gains, ...]:
+    """The gains with other β, inside their ranges and in four digits."""
+    made = []
+    for k, (g, per, width) in enumerate(zip(gains, _per_gain(axis, gains), widths, strict=True)):
+        item = axis.ranges[4 * k]
+        made.append(replace(g, beta=min(max(float(f"{width / per:.4g}"), item.low), item.high)))
     return tuple(made)
+
+
+def _per_gain(axis: Axis, gains: tuple[Gains, ...]) -> list[float]:
+    rows = error_rows(axis.model, axis.bounds, gains, 1e-9 * axis.box, np.zeros(len(axis.model.inputs)))
+    # no effect at all: an actuator that may be stuck
+    return [float((rows.control_gain[i] or 1.0) / (2 * rows.mass_high[i])) for i in axis.law.governed]
 
 
 def starting_gains(problem: MachineProblem, progress: Progress) -> Tuned:
@@ -193,11 +207,39 @@ def covered(problem: MachineProblem, scenario: MachineScenario) -> bool:
     return True
 
 
-def make_machine_evaluator(study: MachineStudy) -> Callable[[Sequence[Array]], list[Outcome]]:
-    """The outcomes of a batch of points as a pure function."""
+@dataclass(frozen=True, kw_only=True)
+class Window:
+    """The part of the unit cube of all gains that a search goes through: few points far from a proved one are proved.
+
+    Attributes:
+        low: Lower corner. Shape (d,).
+        high: Upper corner.
+    """
+
+    low: Array
+    high: Array
+
+    @staticmethod
+    def around(point: Array) -> Window:
+        """The window around a point."""
+        return Window(low=np.clip(point - REACH, 0.0, 1.0), high=np.clip(point + REACH, 0.0, 1.0))
+
+    def at(self, local: Array) -> Array:
+        """The point of the cube for one of the window's own unit cube."""
+        return self.low + np.asarray(local) * (self.high - self.low)
+
+    def local(self, point: Array) -> Array:
+        """The reverse."""
+        return (point - self.low) / (self.high - self.low)
+
+
+def make_machine_evaluator(study: MachineStudy, window: Window) -> Callable[[Sequence[Array]], list[Outcome]]:
+    """The outcomes of a batch of points of a window as a pure function."""
     problem = assemble_machine(study)
     loop = MachineLoop(problem)
-    return lambda points: evaluate_machine(problem, loop, [gains_of_point(problem, point) for point in points])
+    return lambda points: evaluate_machine(
+        problem, loop, [gains_of_point(problem, window.at(point)) for point in points]
+    )
 
 
 def evaluate_machine(problem: MachineProblem, loop: MachineLoop, candidates: Sequence[GainSet]) -> list[Outcome]:
@@ -259,13 +301,15 @@ def tuned_gains(
             now.evaluations / allowed.evaluations, f"best {cost:.4g}" if math.isfinite(cost) else "none proved yet"
         )
 
-    with workers(make_machine_evaluator, (problem.study,), options.jobs, options.cluster) as pool:
+    start = point_of(problem, first.gains)
+    window = Window.around(start)
+    with workers(make_machine_evaluator, (problem.study, window), options.jobs, options.cluster) as pool:
         found = run_search(
-            method, pool.map, point_of(problem, first.gains), population, seed, allowed,
+            method, pool.map, window.local(start), population, seed, allowed,
             restored=kept_population(state), after=after,
         )  # fmt: skip
     best = best_of(found)
-    gains = gains_of_point(problem, found.points[found.best])
+    gains = gains_of_point(problem, window.at(found.points[found.best]))
     for digits in (2, 3):
         short = _shortened(problem, gains, digits)
         contracts = problem.composed(short)

@@ -94,8 +94,10 @@ class MachineProblem:
         currents = (section.current_a,) * (len(axis.plant.states) - 2)
         if self.observer is None:
             return (section.position, section.speed, *currents)
+        # |v(0) - r'(0)|, from the bounds on |Q_1(0)| and |Q_2(0)|
+        start = axis.bounds.initial[1] + axis.ranges[0].high / 2 * axis.bounds.initial[0]
         proof = sampled_bounds(
-            self.observer, noise=section.position, initial=axis.bounds.initial[1],
+            self.observer, noise=section.position, initial=start,
             acceleration=observed(tube, axis.bounds.reference[3].magnitude, self.period),
         )  # fmt: skip
         assert proof is not None  # it was there for a tube of nothing, and its contraction does not depend on the tube

@@ -198,16 +198,23 @@ def turn(x: Fraction) -> tuple[Interval, Interval]:
 
 
 def turned(a: Interval) -> tuple[Interval, Interval]:
-    """Ranges of sine and cosine, by their values and slopes at the middle and a curvature of at most 1."""
+    """Ranges of sine and cosine.
+
+    By value and slope at the middle with a curvature of at most 1; where the other one keeps its sign, by the ends.
+    """
     middle = down((a[0] + a[1]) / 2)
     radius = max(a[1] - middle, middle - a[0])
     sine, cosine = turn(middle)
     way, bend = symmetric(radius), symmetric(radius * radius / 2)
     unit = symmetric(Fraction(1))
-    return (
-        meet(unit, add(add(sine, mul(cosine, way)), bend)),
-        meet(unit, add(add(cosine, mul(neg(sine), way)), bend)),
-    )
+    sines = meet(unit, add(add(sine, mul(cosine, way)), bend))
+    cosines = meet(unit, add(add(cosine, mul(neg(sine), way)), bend))
+    (first, last), keeps = (turn(a[0]), turn(a[1])), lambda b: not b[0] <= 0 <= b[1]
+    if keeps(cosines):
+        sines = meet(sines, (min(first[0][0], last[0][0]), max(first[0][1], last[0][1])))
+    if keeps(sines):
+        cosines = meet(cosines, (min(first[1][0], last[1][0]), max(first[1][1], last[1][1])))
+    return sines, cosines
 
 
 def magnitude(a: Interval) -> Fraction:
@@ -1262,8 +1269,11 @@ class Period:
     def speeds(self, bound: list[Fraction]) -> list[Fraction]:
         """Bounds on |z_i'| for all t, in the box's unit a period, for |y| <= bound at the samples."""
         here = [dot(map(abs, row), bound) for row in self.back]
-        total = self.states(bound)
-        moved = [whole - part for whole, part in zip(total, here, strict=True)]
+        # from the sample before, whose state the held input answers to
+        moving, push = self.motion
+        drawn = [dot(row, bound) + p for row, p in zip(moving, push, strict=True)]
+        moved = [min(own, 2 * half) for own, half in zip(drawn, self.half_way, strict=True)]
+        total = [a + b for a, b in zip(here, moved, strict=True)]
         shaken = [n + d + dot(row, here) for n, d, row in zip(self.noise, self.drift, self.k_spread, strict=True)]
         found = []
         for i in range(self.n):
@@ -1719,6 +1729,9 @@ def check_machine(data: dict[str, Any], text: str, file: str) -> Report:
     need(set(data["joints"]) == set(names), "the joints are not those of the controller")
     for name in names:
         need(NAME.fullmatch(name) is not None, "a joint's name must be a plain identifier")
+    for key in ("gains", "assumptions"):
+        count = sum(len(listed(data[key], name)) for name in names)
+        need(count == len(data[key]), f"the {key} list what no joint has")
     plain, joints = json.loads(text), []
     made: list[Obligation] = []
     for name in names:
@@ -1758,25 +1771,65 @@ def tube_of(claim: Claim, verdict: Held) -> tuple[Fraction, Fraction, Fraction]:
 
 
 def belongs(data: dict[str, Any], own: dict[str, Any], name: str) -> None:
-    """Refuse a joint whose statement is not that of the machine's study."""
-    study, part = data["study"], own["study"]
-    stated, section = study["plant"]["axes"][name], study["controller"]
-    need(part["plant"] == stated, f"{name}: the plant is not the study's")
+    """Refuse a joint whose statement is not that of the machine's study and controller."""
+    study, part, controller = data["study"], own["study"], data["controller"]
     same = [
-        (own["controller"]["law"], section["law"]),
-        (number(own["controller"]["rate_hz"], "rate_hz"), number(section["rate_hz"], "rate_hz")),
-        (own["controller"]["modelling"], section["modelling"]),
+        (part["plant"], study["plant"]["axes"][name]),
+        (own["controller"]["law"], study["controller"]["law"]),
+        (own["controller"]["law"], controller["law"]),
+        (own["controller"]["rate_hz"], study["controller"]["rate_hz"]),
+        (own["controller"]["rate_hz"], controller["rate_hz"]),
+        (own["controller"]["period_s"], controller["period_s"]),
+        (own["controller"]["modelling"], study["controller"]["modelling"]),
+        (own["controller"]["modelling"], controller["modelling"]),
         (part["controller"]["gains"], study["ranges"][name]),
         (part["requirements"]["tracking_error_m"], study["requirements"]["joint_error"][name]),
         (part["validation"]["transient_s"], study["validation"]["transient_s"]),
-        (part["uncertainty"]["initial"], study["uncertainty"]["axes"][name]["initial"]),
         (own["reference"]["segments"], data["reference"]["joints"][name]["segments"]),
     ]
+    same += [(prefixed(own[key], name), listed(data[key], name)) for key in ("gains", "assumptions")]
     need(all(a == b for a, b in same), f"{name}: the statement is not the study's")
-    least = study["uncertainty"]["axes"][name]["noise"]
-    for state, value in part["uncertainty"]["noise"].items():
-        wanted = number(least.get(state, 0), state)
-        need(number(value, state) >= wanted, f"{name}: less noise is assumed than the study states")
+    watched = study["controller"].get("observer") is not None
+    for k, row in enumerate(own["controller"]["subsystems"]):
+        key = ("position", "speed", "current_a")[min(k, 2)]
+        for kind in ("noise", "initial"):
+            wanted = number(study["uncertainty"][kind][key], key)
+            given = number(part["uncertainty"][kind][row["state"]], key)
+            measured = kind == "initial" or k > 1 or not watched  # else the obligation of the observer decides
+            need(not measured or given >= wanted, f"{name}: less {kind} {key} is assumed than the study states")
+    stated_drive(study["plant"], name)
+
+
+def prefixed(entries: list[dict[str, Any]], name: str) -> list[dict[str, Any]]:
+    """Entries of a joint as the machine lists them."""
+    return [{**entry, "name": f"{name}.{entry['name']}"} for entry in entries]
+
+
+def listed(entries: list[dict[str, Any]], name: str) -> list[dict[str, Any]]:
+    """What a machine lists of one joint."""
+    return [entry for entry in entries if entry["name"].startswith(f"{name}.")]
+
+
+def stated_drive(plant: dict[str, Any], name: str) -> None:
+    """Refuse resolved parameters that are milder than what the study says of an actuator."""
+    axis, own = plant["axes"][name], plant["joints"].get(name, {})
+    parameters, limits = axis["parameters"], {limit["name"]: limit["value"] for limit in axis["limits"]}
+    stated = {**plant["parameters"], **own.get("parameters", {})}
+    if plant["model"] == "arm":
+        stated["armature"] = own["armature"]
+        e = parameters["effectiveness"]
+        value, tolerance = number(e["value"], "effectiveness"), number(e["tolerance"], "effectiveness")
+        least, room = number(own["least_effectiveness"], "effectiveness"), Fraction(1, 10**12)
+        covered = value * (1 - tolerance) <= least + room and value * (1 + tolerance) >= 1 - room
+        need(covered, f"{name}: the actuator's effectiveness is not the study's")
+        damping = parameters["damping"]["value"]
+        need(damping == plant["damping"], f"{name}: the joint's damping is not the study's")
+        for key, limit in (("torque", own["torque"]["value"]), ("speed", own["speed_limit"])):
+            need(limits[key] == limit, f"{name}: the limit on {key} is not the study's")
+    for key, entry in stated.items():
+        same = parameters[key]["value"] == entry["value"]
+        given = entry.get("tolerance")
+        need(same and given in (None, parameters[key]["tolerance"]), f"{name}: {key} is not the study's")
 
 
 class Machine:
@@ -1865,7 +1918,7 @@ class Machine:
         """The smallest spare of what the joints assume of their loads, relative to its size; and where."""
         nothing = [(Fraction(0),) * 3] * self.count
         middle = (self.payload[0] + self.payload[1]) / 2
-        half = symmetric((self.payload[1] - self.payload[0]) / 2)
+        half = (self.payload[1] - self.payload[0]) / 2
         spare: list[tuple[Fraction, str]] = []
         for part in self.slices:
             along = {
@@ -1874,20 +1927,20 @@ class Machine:
             }  # fmt: skip
             at_reference = {**self._ranges(part, nothing), "payload": (middle, middle)}
             foreseen = derivatives(self.loads, at_reference, along)
-            beside: dict[str, Form] = {name: {name: ONE} for name in self._ranges(part, nothing)}
-            beside["payload"] = {"": half}
             around = {**self._ranges(part, self.promise), "payload": self.payload}
-            moved = derivatives(self.loads, around, beside)
+            moved = derivatives(self.loads, around, {name: {name: ONE} for name in around})
             for i, joint in enumerate(self.joints):
-                size = magnitude(moved[i][1].get("", ZERO))
-                for name, slope in moved[i][1].items():
-                    if name:
-                        j = int(name[1:])
-                        if name == f"a{i}":
-                            slope = add(slope, neg((self.own[i], self.own[i])))
-                        if name[0] == "a":
-                            self.slopes[i][j] = max(self.slopes[i][j], magnitude(slope))
-                        size = up(size + magnitude(slope) * self.promise[j]["xva".index(name[0])])
+                size, along_own = Fraction(0), f"a{i}"
+                for name, slope in {along_own: ZERO, **moved[i][1]}.items():
+                    if name == "payload":
+                        size = up(size + magnitude(slope) * half)
+                        continue
+                    j = int(name[1:])
+                    if name == along_own:
+                        slope = add(slope, neg((self.own[i], self.own[i])))
+                    if name[0] == "a":
+                        self.slopes[i][j] = max(self.slopes[i][j], magnitude(slope))
+                    size = up(size + magnitude(slope) * self.promise[j]["xva".index(name[0])])
                 own = (self.own[i], self.own[i])
                 load = add(foreseen[i][0], neg(mul(own, part[i][2])))
                 rate = add(foreseen[i][1].get("", ZERO), neg(mul(own, part[i][3])))
@@ -1937,7 +1990,9 @@ class Machine:
             claim = joint.claim
             jerk = magnitude(claim.reference[3])
             told = self.promise[self.joints.index(joint)]
-            position, speed = self.observer.errors(self.encoder, told[2] + claim.period * jerk, claim.initial[1])
+            # |v(0) - r'(0)| where |Q_2(0)| and |Q_1(0)| are bounded
+            start = claim.initial[1] + joint.loop.gain[0].beta[1] / 2 * claim.initial[0]
+            position, speed = self.observer.errors(self.encoder, told[2] + claim.period * jerk, start)
             need(self.observer.period == claim.period, "the observer's period is not that of the law")
             found += [self._share(claim.noise[0], position), self._share(claim.noise[1], speed)]
         return min(found), "the errors of every observer are inside the assumed measurement errors"

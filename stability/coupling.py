@@ -129,7 +129,7 @@ class Loads:
                 radii = {"x": tube.position, "v": tube.speed, "a": tube.acceleration}
                 for letter, radius in radii.items():
                     shift = self.own[i] if letter == "a" and i == j else 0.0
-                    slope = _magnitude(found.get(f"{letter}{j}"), shift, one[0])
+                    slope = _magnitude(found.get(f"{letter}{j}"), shift, unit)
                     total = total + slope * radius
                     if letter == "a":
                         inertia[i, j] = slope.max()

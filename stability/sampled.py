@@ -306,7 +306,7 @@ def speeds(rows: DeviationRows, found: Sampled, period: float) -> Array:
         at, image = nominal(part), comparison(part, period, cell.transform)
         back, plain = image.inverse, rates(part, found.radii, found.held)
         here = np.abs(back) @ cell.start
-        moved = np.minimum(image.motion[0] @ cell.start + image.motion[1], period / 2 * plain)
+        moved = np.minimum(image.motion[0] @ cell.start + image.motion[1], period * plain)  # since the sample before
         shaken = part.noise + period * part.drift + at.k_spread @ here
         size = np.abs((at.a - at.b @ at.k) @ back) @ cell.start + np.abs(at.a) @ moved + at.a_spread @ (here + moved)
         size = size + np.abs(at.b) @ shaken + at.b_spread @ found.held + part.disturbance / at.mass

@@ -149,6 +149,6 @@ def claim_of(
 def verdict(claim: Claim) -> bool:
     """True where the checker proves every obligation."""
     try:
-        return all(o.verdict == "proved" for o in checker.obligations(claim))
+        return all(o.verdict == "proved" for o in checker.obligations(claim)[0])
     except checker.NotProvedError:
         return False

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from stability.observer import observer_bounds
+from stability.observer import SampledObserver, observer_bounds, sampled_bounds
 
 
 def peak_gain(first, second, column, output, horizon=40.0):
@@ -48,3 +48,51 @@ def test_gains_that_make_no_sense_are_refused():
     for gains in ((0.0, 1.0), (1.0, -1.0), (float("nan"), 1.0)):
         with pytest.raises(ValueError, match="positive gains"):
             observer_bounds(*gains, noise=1e-6, disturbance=0.5)
+
+
+def worst_sampled(observer, noise, acceleration, samples=1500):
+    """Exact worst case of a sampled observer with constant gain: L1 norms of its impulse responses."""
+    t = observer.period
+    a = np.array([[1 - observer.first, t], [-observer.second, 1.0]])
+    # |x'' - a| <= A moves (x, x') by at most A times the integral of |e_i' exp(..)|, here by its extremes over a period
+    columns = [(noise * np.array([observer.first, observer.second]), 1)]
+    steps = 20
+    fine = t / steps
+    columns += [(acceleration * fine * np.array([t - (k + 0.5) * fine, 1.0]), 1) for k in range(steps)]
+    total = np.zeros(2)
+    for column, _ in columns:
+        state = np.array(column, dtype=float)
+        for _ in range(samples):
+            total += np.abs(state)
+            state = a @ state
+    return total
+
+
+@pytest.mark.parametrize(("bandwidth", "period"), [(6000.0, 1 / 16000), (300.0, 1e-3)])
+def test_sampled_bounds_are_above_the_exact_worst_case_and_near_it(bandwidth, period):
+    observer = SampledObserver.of_bandwidth(bandwidth, 0.0, period)
+    found = sampled_bounds(observer, noise=1e-7, acceleration=0.5, initial=0.0)
+    exact = worst_sampled(observer, 1e-7, 0.5)
+    assert exact[0] < found.position < 1.6 * exact[0]
+    assert exact[1] < found.speed < 2.2 * exact[1]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_sampled_bounds_hold_while_the_adaptive_gain_moves(seed):
+    random, t = np.random.default_rng(seed), 1 / 16000
+    observer = SampledObserver.of_bandwidth(6000.0, 0.15, t)
+    found = sampled_bounds(observer, noise=5e-9, acceleration=1.0, initial=1e-4)
+    error, a, noise = np.array([5e-9, 1e-4]), 1.0, 5e-9
+    for _ in range(4000):
+        assert abs(error[0]) <= found.position and abs(error[1]) <= found.speed
+        a, noise = (v if random.random() < 0.9 else -v for v in (a, noise))
+        gain = 1 + random.choice((0.0, random.random(), 1.0)) * observer.largest
+        inward = gain * np.array([observer.first, observer.second]) * (error[0] + noise)
+        error = np.array([[1, t], [0, 1]]) @ error - inward + a * np.array([t * t / 2, t])
+
+
+def test_an_observer_that_does_not_contract_is_refused():
+    assert sampled_bounds(SampledObserver(first=0.5, second=900.0, largest=8.0, period=1e-3), noise=1e-6,
+                          acceleration=1.0, initial=0.0) is None  # fmt: skip
+    with pytest.raises(ValueError, match="positive gains and period"):
+        SampledObserver(first=0.0, second=1.0, largest=0.1, period=1e-3)

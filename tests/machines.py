@@ -1,0 +1,70 @@
+"""Small studies of machines, for tests."""
+
+import tomllib
+from importlib import resources
+
+from arms import serial_arm
+
+from hdmm_opt.study import parse_data
+
+#: Enough for a proof and a few runs.
+QUICK = {"method": "jaya", "population": 4, "iterations": 0, "seed": 1}
+
+
+def bundled(name):
+    """A bundled study as data."""
+    return tomllib.loads((resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def quick_arm(**changes):
+    """The study arm-p3, short: one move there and back, faults after 3 s, no search."""
+    data = bundled("arm-p3")
+    data["reference"] |= {"waypoints": data["reference"]["waypoints"][:3], "durations_s": [4.0, 4.0], "dwell_s": 0.2}
+    data["tuning"] = dict(QUICK)
+    data["validation"] |= {"transient_s": 0.5, "monte_carlo": 4}
+    for scenario in data["validation"]["scenarios"]:
+        for fault in scenario.get("faults", {}).values():
+            fault["start_s"] = 4.5
+    data["study"]["name"] = "quick-arm"
+    for key, value in changes.items():
+        place, *rest = key.split("__")
+        section = data[place]
+        for part in rest[:-1]:
+            section = section[part]
+        section[rest[-1]] = value
+    return data
+
+
+def serial_study(joints, tmp_path, armature=40.0):
+    """A serial arm of any number of joints, with actuators whose inertia dominates."""
+    path = tmp_path / f"arm{joints}.urdf"
+    path.write_text(serial_arm(joints), encoding="utf-8")
+    names = [f"j{k + 1}" for k in range(joints)]
+    section = {
+        name: {
+            "armature": {"value": armature * 0.75**k, "unit": "kg m^2", "tolerance": 0.05, "source": "assumed"},
+            "torque": {"value": 1500.0 * 0.85**k, "unit": "N m", "source": "assumed"},
+            "speed_limit": 2.0, "least_effectiveness": 0.8,
+        }
+        for k, name in enumerate(names)
+    }  # fmt: skip
+    start = [0.1, 0.4, -0.2, 0.5, 0.1, -0.3, 0.2][:joints]
+    goal = [v + 0.25 for v in start]
+    return {
+        "study": {"name": f"serial-{joints}"},
+        "plant": {"model": "arm", "urdf": str(path), "tip_m": [0.1, 0.05, 0.2], "damping": 1.0, "joints": section},
+        "uncertainty": {"payload_kg": [0.0, 0.5], "noise": {"position": 1e-6, "speed": 1e-4}},
+        "reference": {"kind": "quintic", "waypoints": [start, goal], "durations_s": [1.5], "dwell_s": 0.1},
+        "controller": {"law": "rac", "rate_hz": 1000, "gains": {
+            "beta_1": {"min": 5.0, "max": 100.0}, "epsilon_1": {"min": 1.0, "max": 100.0},
+            "beta_2": {"min": 10.0, "max": 1e5}, "epsilon_2": {"min": 1.0, "max": 100.0},
+        }},
+        "requirements": {"tool_error_m": 0.2, "joint_error": dict.fromkeys(names, 0.2)},
+        "tuning": dict(QUICK),
+        "validation": {"transient_s": 0.5, "monte_carlo": 4, "scenarios": [{"name": "healthy", "noise": 1.0}]},
+    }  # fmt: skip
+
+
+def study_from(data):
+    """The validated study."""
+    return parse_data(data, "test")
