@@ -100,7 +100,9 @@ def standing(
     """
     before = study_of_machine(document["study"])
     if joint not in study.joints or study.joints != before.joints:
-        raise InvalidInputError(f"--joint is one of {', '.join(before.joints)}: got {joint}; correct it")
+        raise InvalidInputError(
+            f"--exchange names one of the joints {', '.join(before.joints)}: got {joint}; correct it"
+        )
     references = tuple(reference_of(document["joints"][name]) for name in study.joints)
     problem = assemble_machine(study, references)
     old, _ = machine_of(document)

@@ -28,6 +28,7 @@ from .machine_study import MachineStudy
 from .plants import Parameter, defaults
 from .plants.crane_dynamics import JOINTS, strokes
 from .problem import gain_ranges, operating_box
+from .study import nearest
 
 Array = NDArray[np.float64]
 
@@ -137,6 +138,7 @@ def assemble_machine(study: MachineStudy, references: tuple[Reference, ...] | No
         InvalidInputError: an unreachable reference, or sections that do not fit each other.
     """
     machine = built(study)
+    _known_parameters(study, machine)
     if references is None:
         references = _references(study, machine)
     slices = sliced(references)
@@ -146,6 +148,19 @@ def assemble_machine(study: MachineStudy, references: tuple[Reference, ...] | No
     foreseen = loads.foreseen(slices)
     axes = tuple(_axis(study, machine, k, references[k], foreseen[k]) for k in range(len(machine.joints)))
     return MachineProblem(study=study, machine=machine, axes=axes, slices=slices, loads=loads, observer=observer)
+
+
+def _known_parameters(study: MachineStudy, machine: Machine) -> None:
+    """Refuse scenarios that name parameters which no joint has."""
+    known = {key for plant in machine.plants for key in plant.parameters}
+    known |= {
+        f"{name}.{key}" for name, plant in zip(machine.joints, machine.plants, strict=True) for key in plant.parameters
+    }
+    for scenario in study.validation.scenarios:
+        for name in scenario.parameters:
+            if name not in known:
+                where = f"validation.scenarios.{scenario.name}.parameters.{name}"
+                raise InvalidInputError(f"{where} is unknown; {nearest(name, sorted(known))}")
 
 
 def built(study: MachineStudy) -> Machine:
@@ -165,7 +180,19 @@ def built(study: MachineStudy) -> Machine:
             torque=(drive.torque.value, drive.torque.source), speed=drive.speed_limit,
             effectiveness=drive.least_effectiveness,
         )  # fmt: skip
-    return arm(_urdf(str(section.urdf)), drives, section.damping, section.tip_m)
+    machine = arm(_urdf(str(section.urdf)), drives, section.damping, section.tip_m)
+    for name, plant in zip(machine.joints, machine.plants, strict=True):
+        drive = section.joints[name]
+        assert drive.armature is not None and drive.torque is not None
+        for key, given, wanted in (
+            ("torque", drive.torque.unit, plant.input_unit),
+            ("armature", drive.armature.unit, plant.parameters["armature"].unit),
+        ):
+            if given != wanted:
+                raise InvalidInputError(
+                    f'plant.joints.{name}.{key}.unit must be "{wanted}": got "{given}"; convert the value'
+                )
+    return machine
 
 
 def _urdf(name: str) -> str:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from .plants import defaults
+from .plants.crane import LIFT, TELESCOPE, TILT
 from .plants.crane_dynamics import JOINTS
 from .study import (
     RESERVED,
@@ -59,6 +60,10 @@ class MachineSection(Section):
             for name in names:
                 if name not in JOINTS:
                     raise ValueError(f"|{where}.{name}|is not a joint of the crane|{nearest(name, JOINTS)}")
+        for name, stroke in self.locked.items():
+            longest = {"lift": LIFT.stroke, "tilt": TILT.stroke}.get(name, TELESCOPE)
+            if not 0 <= stroke <= longest:
+                raise ValueError(f"|locked.{name}|is a stroke from 0 to {longest:g} m: got {stroke:g}|correct it")
         sections = [("parameters", self.parameters)]
         sections += [(f"joints.{name}.parameters", drive.parameters) for name, drive in self.joints.items()]
         for where, given in sections:

@@ -398,6 +398,9 @@ def test_the_tools_bound_holds_at_corners(designed):
 
 
 BAD = {
+    "plant__joints__lift__torque__unit": ("lbf", 'unit must be "N m"'),
+    "plant__joints__lift__armature__unit": ("furlong", 'unit must be "kg m^2"'),
+    "validation__scenarios": ([{"name": "odd", "parameters": {"dampng": 1.0}}], "parameters.dampng is unknown"),
     "plant__joints__tilt__torque": (None, "plant.joints.tilt.torque is required"),
     "uncertainty__payload_kg": ([5.0, 1.0], "0 <= lower <= upper"),
     "reference__waypoints": ([[0.1, 0.2], [0.2, 0.3], [0.1, 0.2]], "one entry for each of lift, tilt, telescope"),
