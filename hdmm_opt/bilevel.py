@@ -26,10 +26,8 @@ from .plants.crane import reach
 
 Array = NDArray[np.float64]
 
-#: Size of the leader's first steps, as a share of its ranges.
+#: Size of the leader's first steps: of a duration as a share of where it starts, of an extension as one of its range.
 STEP = 0.08
-#: Shortest move that the leader may ask for, as a share of the longest.
-SHORTEST = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,13 +43,16 @@ class Bilevel:
     history: tuple[float, ...]
 
 
-def bilevel(job: Job, evaluations: int = 40, tick: Callable[[int, float], None] | None = None) -> Bilevel:
+def bilevel(
+    job: Job, evaluations: int = 40, tick: Callable[[int, float], None] | None = None, *, spans: int = 24
+) -> Bilevel:
     """Solve a job on two levels, and by three single-level programs to compare with.
 
     Args:
         job: The job; its moves have no places to pass.
         evaluations: Decisions of the leader to try, at the most.
         tick: Called with the number of decisions tried and the best lost energy, J.
+        spans: Polynomial pieces of every motion.
 
     Returns:
         The motions. Every one is inside its limits for all t.
@@ -70,8 +71,8 @@ def bilevel(job: Job, evaluations: int = 40, tick: Callable[[int, float], None] 
     if any(move.via for move in job.moves):
         raise InvalidInputError('a bilevel move has no places to pass: got via; remove them, or use kind = "bspline"')
     costs = (("time", {"time": 1.0}), ("effort", {"time": 0.0, "effort": 1.0}), ("energy", {"time": 0.0, "loss": 1e-3}))
-    ways = [carried_out(job, _cost(weights), f"{name}-optimal") for name, weights in costs]
-    leader = _Leader(job, ways[-1], tick)
+    ways = [carried_out(job, _cost(weights), f"{name}-optimal", spans=spans) for name, weights in costs]
+    leader = _Leader(job, ways, tick, spans)
     return Bilevel(ways=(*ways, leader.search(evaluations)), history=tuple(leader.history))
 
 
@@ -80,10 +81,17 @@ def _cost(weights: dict[str, float]) -> Callable[[float], Any]:
 
 
 class _Leader:
-    """The search over durations and extensions, each as a share of its range."""
+    """The search over durations, in those of the least lossy motions, and extensions, as shares of their range.
 
-    def __init__(self, job: Job, start: Motions, tick: Callable[[int, float], None] | None) -> None:
-        self.job, self.start, self.tick = job, start, tick
+    The quickest motions bound the durations from below: no follower is quicker.
+    """
+
+    def __init__(
+        self, job: Job, ways: Sequence[Motions], tick: Callable[[int, float], None] | None, spans: int
+    ) -> None:
+        self.job, self.start, self.tick, self.spans = job, ways[-1], tick, spans
+        self.durations = np.array([motion.parts["time"] for motion in self.start.motions])
+        self.quickest = np.array([motion.parts["time"] for motion in ways[0].motions]) / self.durations
         self.reach = float(job.limits.room[1][2])
         self.history: list[float] = []
         self.best, self.found = np.inf, None
@@ -93,13 +101,15 @@ class _Leader:
 
         ends = [motion.spline.coefficients[-1] for motion in self.start.motions]
         first = np.array(
-            [motion.parts["time"] / self.job.longest for motion in self.start.motions]
+            [1.0] * len(self.durations)
             + [end[2] / self.reach for end, move in zip(ends, self.job.moves, strict=True) if move.tool is not None]
         )
         moves = len(self.job.moves)
-        bounds = [(SHORTEST, 1.0)] * moves + [(0.0, 1.0)] * (len(first) - moves)
+        bounds = [(float(low), self.job.longest / t) for low, t in zip(self.quickest, self.durations, strict=True)]
+        bounds += [(0.0, 1.0)] * (len(first) - moves)
         first = np.clip(first, *np.transpose(bounds))
-        steps = STEP * np.eye(len(first)) * np.where(first > 0.5, -1, 1)
+        ends_high = first > np.mean(bounds, axis=1)
+        steps = STEP * np.eye(len(first)) * np.where(ends_high, -1, 1)
         minimize(
             self.lost, first, method="Nelder-Mead", bounds=bounds,
             options={"initial_simplex": np.stack([first, *(first + steps)]), "maxfev": evaluations,
@@ -128,11 +138,15 @@ class _Leader:
         """The follower: the smoothest motions to the leader's places in the leader's times."""
         motions: list[Motion] = []
         at: Any = np.array(self.job.start)
-        durations, extensions = self.job.longest * decision, iter(self.reach * decision[len(self.job.moves) :])
+        durations, extensions = (
+            self.durations * decision[: len(self.job.moves)],
+            iter(self.reach * decision[len(self.job.moves) :]),
+        )
         for move, duration, led in zip(self.job.moves, durations, self.start.motions, strict=False):
             end = np.array(move.joints) if move.tool is None else self.place(move.tool, next(extensions), led)
             cost = crane_cost(time=0.0, jerk=1.0, payload=move.payload)
-            motions.append(solve(self.job.task([at, end], move.payload, cost=cost, duration=float(duration))))
+            task = self.job.task([at, end], move.payload, cost=cost, duration=float(duration), spans=self.spans)
+            motions.append(solve(task))
             at = end
         return Motions(name="leader and follower", job=self.job, motions=tuple(motions))
 

@@ -359,10 +359,10 @@ def _run_motion(chosen: Any, output: Path | None) -> int:
     heads = ("time [s]", "energy [J]", "lost [J]", "effort [s]", "efficiency")
     click.echo(f"{'motion':20}" + "".join(f"{head:>12}" for head in heads))
     for way in ways:
-        total = way.totals
+        total, share = way.totals, way.efficiency
         click.echo(
             f"{way.name:20}{way.duration:12.4g}{total['energy']:12.5g}{total['loss']:12.5g}"
-            f"{total['effort']:12.3g}{way.efficiency:12.3f}"
+            f"{total['effort']:12.3g}" + (f"{'-':>12}" if share is None else f"{share:12.3f}")
         )
     click.echo("every motion is inside its limits for all t", err=True)
     click.echo(f"assumed, to be replaced by yours: {', '.join(ASSUMED)}", err=True)
@@ -382,8 +382,9 @@ def _ways(chosen: Any, progress: Any) -> Any:
     if section.kind == "bilevel":
         budget = section.evaluations or 24
         return bilevel(
-            chosen.job(), budget, lambda done, best: progress.update(done / budget, f"lost {best:.4g} J")
-        ).ways
+            chosen.job(), budget, lambda done, best: progress.update(done / budget, f"lost {best:.4g} J"),
+            spans=section.spans,
+        ).ways  # fmt: skip
     weights = {"time": 1.0} if section.cost is None else section.cost.model_dump()
     found = carried_out(
         chosen.job(), lambda payload: crane_cost(payload=payload, **weights), "spline program", spans=section.spans

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 #: A tool nearer to its goal than this, m, is there.
 NOWHERE = 1e-6
+#: Extensions of the telescope that a posture is looked for with.
+EXTENSIONS = 13
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,13 +76,21 @@ class Job:
         """Joint coordinates at a place of the tool, the nearest to given ones of a few extensions.
 
         Raises:
-            LimitViolatedError: the tool cannot reach the place.
+            LimitViolatedError: no posture was found. Not guaranteed: that there is none.
         """
-        longest = self.limits.room[1][2]
-        tried = [reach(place, float(share * longest), at) for share in np.linspace(0.1, 0.9, 9)]
-        found = [w for w in tried if w is not None and self.limits.holds(w)]
-        if not found:
-            raise LimitViolatedError(f"the tool cannot reach ({place[0]:g}, {place[1]:g}) m; move the place")
+        low, high = self.limits.room
+        middle, span = (low + high) / 2, high - low
+        starts = [at, middle, *(middle + 0.3 * span * np.array(turn) for turn in ((1, 1, 0), (1, -1, 0), (-1, 1, 0)))]
+        extensions = [float(at[2]), *np.linspace(low[2], high[2], EXTENSIONS)]
+        for start in starts:
+            tried = [reach(place, float(extension), start) for extension in extensions]
+            found = [w for w in tried if w is not None and self.limits.holds(w)]
+            if found:
+                break
+        else:
+            raise LimitViolatedError(
+                f"no posture with the tool at ({place[0]:g}, {place[1]:g}) m was found; move the place, or give joints"
+            )
         return min(found, key=lambda w: float(np.abs(w - at).max()))
 
 
@@ -109,10 +119,10 @@ class Motions:
         return dict(zip(COSTS, self._integrals[: len(COSTS)].tolist(), strict=True))
 
     @cached_property
-    def efficiency(self) -> float:
-        """Work that leaves the rods while the motors draw power, over the energy drawn then."""
+    def efficiency(self) -> float | None:
+        """Work that the rods do while the motors draw power, over the energy drawn then; None where none is drawn."""
         useful, drawn = self._integrals[len(COSTS) :]
-        return float(useful / drawn)
+        return float(useful / drawn) if drawn > 0 else None
 
     @cached_property
     def _integrals(self) -> Array:
@@ -124,9 +134,29 @@ class Motions:
             t = np.linspace(motion.spline.start, motion.spline.end, 4001)
             curves = (motion.spline(t, order).T for order in range(4))
             power, lost, effort = np.array(running_costs(move.payload).map(len(t))(*curves))
-            useful = np.where(power > 0, power - lost, 0.0)
+            useful = np.where(power > 0, np.maximum(power - lost, 0.0), 0.0)
             parts.append(trapezoid([power, lost, effort, useful, np.maximum(power, 0.0)], t))
         return np.sum(parts, axis=0)
+
+
+def _going_somewhere(job: Job, move: Move, at: Array) -> None:
+    """Refuse a move that ends or passes where the tool is already, or inside an obstacle.
+
+    Raises:
+        ValueError: it does.
+    """
+    if move.joints is not None and not move.via and float(np.abs(np.array(move.joints) - at).max()) < NOWHERE:
+        raise ValueError(f"the joints go from one place to another: they are at {list(move.joints)} already")
+    places = [*move.via, *([] if move.tool is None else [move.tool])]
+    if places and apart(at, places[0]) < NOWHERE:
+        raise ValueError(f"the tool goes from one place to another: it is at {list(places[0])} m already")
+    for place in places:
+        for obstacle in job.obstacles:
+            clear = float(obstacle.clearance(place))
+            if clear < 0:
+                raise ValueError(
+                    f"the tool keeps clear of {obstacle.name}: ({place[0]:g}, {place[1]:g}) m is {-clear:.3g} m inside"
+                )
 
 
 def carried_out(job: Job, cost: Callable[[float], Any], name: str, **options: Any) -> Motions:
@@ -148,8 +178,7 @@ def carried_out(job: Job, cost: Callable[[float], Any], name: str, **options: An
     at = np.array(job.start)
     for number, move in enumerate(job.moves, 1):
         try:
-            if move.tool is not None and not move.via and apart(at, move.tool) < NOWHERE:
-                raise ValueError(f"the tool goes from one place to another: it is at {list(move.tool)} m already")
+            _going_somewhere(job, move, at)
             waypoints: list[Any] = [at]
             for place in move.via:
                 near = job.near(place, at if len(waypoints) == 1 else waypoints[-1].guess)

@@ -154,7 +154,8 @@ def arm(text: str, drives: Mapping[str, Drive], damping: float, tip: tuple[float
     """An arm from URDF with a torque at every joint.
 
     Args:
-        text: The URDF; its chain is that of the joints that `drives` names, in the order of the file.
+        text: The URDF. The joints that `drives` names are a chain from the ground on; all others stand still at 0, and
+            what they carry goes with the link that they sit on.
         drives: The actuators by joint.
         damping: Viscous friction of every joint, N m s/rad or N s/m.
         tip: Place of the tool, and of the payload, in the frame of the last body, m.
@@ -162,36 +163,41 @@ def arm(text: str, drives: Mapping[str, Drive], damping: float, tip: tuple[float
     Raises:
         InvalidInputError: joints that the file does not have, or that are no chain.
     """
-    tree = _chain(text, tuple(drives))
-    plants = [_driven(body, drives[body.joint], damping) for body in tree]
-    n = len(tree)
+    names = tuple(drives)
+    tree, places = _tree(text, names)
+    plants = [_driven(tree[place], drives[name], damping) for name, place in zip(names, places, strict=True)]
+    n = len(names)
     x, v, a, payload = ca.SX.sym("x", n), ca.SX.sym("v", n), ca.SX.sym("a", n), ca.SX.sym("payload")
-    forces = inverse_dynamics(tree, x, v, a, payloads=(Payload(body=n - 1, mass=payload, position=tip),))
-    rotation, origin = pose(tree, x, n - 1)
+
+    def whole(part: Any) -> Any:
+        return ca.vertcat(*(part[places.index(k)] if k in places else 0 for k in range(len(tree))))
+
+    load = Payload(body=places[-1], mass=payload, position=tip)
+    forces = inverse_dynamics(tree, whole(x), whole(v), whole(a), payloads=(load,))
+    rotation, origin = pose(tree, whole(x), places[-1])
     return Machine(
-        name="arm", joints=tuple(drives), plants=tuple(plants),
-        forces=ca.Function("forces", [x, v, a, payload], [forces]),
+        name="arm", joints=names, plants=tuple(plants),
+        forces=ca.Function("forces", [x, v, a, payload], [ca.vertcat(*(forces[k] for k in places))]),
         tool=ca.Function("tool", [x], [origin + rotation @ ca.DM(tip)]), assumed=(),
     )  # fmt: skip
 
 
 @cache
-def _chain(text: str, names: tuple[str, ...]) -> tuple[Body, ...]:
-    found = {body.joint: body for body in bodies(text)}
+def _tree(text: str, names: tuple[str, ...]) -> tuple[tuple[Body, ...], tuple[int, ...]]:
+    """All bodies of a file, and the indices of those that named joints move."""
+    tree = tuple(bodies(text))
+    found = {body.joint: k for k, body in enumerate(tree)}
     missing = [name for name in names if name not in found]
     if missing:
         raise InvalidInputError(f'the URDF has no joint "{missing[0]}"; known: {", ".join(found)}')
-    order = {name: k for k, name in enumerate(found)}
-    chain = []
-    for k, name in enumerate(names):
-        parent = found[name].parent
-        before = order[names[k - 1]] if k else -1
-        if parent != before:
+    places = tuple(found[name] for name in names)
+    for k, place in enumerate(places):
+        if tree[place].parent != (places[k - 1] if k else -1):
             raise InvalidInputError(
-                f'the joints of an arm follow each other: "{name}" does not move with the one before'
+                f'the joints of an arm follow each other: "{names[k]}" does not move with the one before; '
+                "name all joints of the chain, from the ground on"
             )
-        chain.append(replace(found[name], parent=k - 1))
-    return tuple(chain)
+    return tree, places
 
 
 def _driven(body: Body, drive: Drive, damping: float) -> Plant:

@@ -15,7 +15,7 @@ from stability.network import Contract, prove
 from .axis import Axis
 from .errors import InvalidInputError
 from .gain_file import gains_of, reference_of
-from .machine_file import resolved_machine
+from .machine_file import observer_data, resolved_machine
 from .machine_problem import MachineProblem, assemble_machine
 from .machine_study import MachineStudy
 from .study import parse_data
@@ -48,6 +48,8 @@ def _same_machine(document: Mapping[str, Any], problem: MachineProblem) -> None:
     }  # fmt: skip
     given = {"study": {k: v for k, v in document["study"].items() if k != "sha256"},
              "loads": certificate["loads"], "tool": certificate["tool"]}  # fmt: skip
+    if problem.observer is not None:
+        made["observer"], given["observer"] = observer_data(problem), document["controller"]["observer"]
     for name, axis in zip(problem.machine.joints, problem.axes, strict=True):
         made[name] = axis.model.to_data()
         given[name] = document["joints"][name]["certificate"]["model"]

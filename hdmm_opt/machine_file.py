@@ -143,7 +143,7 @@ def build_machine(
             "law": study.controller.law, "modelling": list(study.controller.modelling),
             "rate_hz": study.controller.rate_hz, "period_s": problem.period,
             "joints": [{"name": name} for name in joints],
-            **({} if problem.observer is None else {"observer": _observer(problem)}),
+            **({} if problem.observer is None else {"observer": observer_data(problem)}),
         },
         "gains": [
             {**entry, "name": f"{name}.{entry['name']}"} for name in joints for entry in documents[name]["gains"]
@@ -174,7 +174,8 @@ def _promise(tube: Tube) -> list[str]:
     return [short(ROOM * v, up=True) for v in (tube.position, tube.speed, tube.acceleration)]
 
 
-def _observer(problem: MachineProblem) -> dict[str, Any]:
+def observer_data(problem: MachineProblem) -> dict[str, Any]:
+    """The observer of every joint."""
     observer = problem.observer
     assert observer is not None
     proof = sampled_bounds(observer, noise=0.0, acceleration=1.0, initial=0.0)

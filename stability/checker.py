@@ -2069,7 +2069,8 @@ def observer_of(data: dict[str, Any]) -> Observer | None:
         number(section[key], f"the observer's {key}") for key in ("first", "second", "largest", "period_s", "pole")
     )
     need(first > 0 and second > 0 and largest >= 0 and period > 0, "the observer's gains must be positive")
-    need(largest == number(study["largest"], "largest"), "the observer's adaptive scalar is not the study's")
+    for key in ("largest", "epsilon", "sigma"):
+        need(number(section[key], key) == number(study[key], key), f"the observer's {key} is not the study's")
     rate = number(data["controller"]["rate_hz"], "rate_hz")
     need(abs(period * rate - 1) < Fraction(1, 10**12), "the observer's period is not 1 / rate_hz")
     return Observer(first, second, largest, 1 / rate, pole)

@@ -91,7 +91,8 @@ def solve(task: Task, begin: float = 0.0, guess: Guess | None = None) -> Motion:
         tried = (_Attempt(task, start).run() for start in (*known, *starts))
         motion = next((found for found in tried if found is not None), None)
     if motion is None:
-        raise refusal(task, _reasons(task, relaxation), first.failure, _shortest(task))
+        crowded = relaxation is not None and relaxation.crowded
+        raise refusal(task, _reasons(task, relaxation), first.failure, _shortest(task), crowded=crowded)
     return _from(motion, begin)
 
 
@@ -105,7 +106,7 @@ def _reasons(task: Task, relaxation: Relaxation | None) -> str:
     """What has to give way, and wider limits with which a motion was found and verified."""
     if relaxation is None or not relaxation.widened:
         return ""
-    for growth in GROWTHS:
+    for growth in () if relaxation.crowded else GROWTHS:
         if _Attempt(relaxation.task(task, growth), relaxation.guess).run() is not None:
             return relaxation.text(growth)
     return relaxation.text(None)
@@ -157,7 +158,8 @@ class _Attempt:
     def _rounds(self, start: Guess) -> tuple[Motion | None, bool]:
         """Solve, verify and tighten; and whether a duration ended at its lower bound."""
         task = self.task
-        program = build(task, 1.0 / max(_first_cost(task, start), 1e-12))
+        size = _first_cost(task, start)
+        program = build(task, 1.0 / size if size > 0 else 1.0)
         solver, again = solver_of(program), None
         x = program.shape.packed(list(start.points), start.durations)
         upper, lower = program.upper.copy(), program.lower.copy()

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 #: Share of a limit that a place of rest must leave, because the program keeps half of it.
 RESERVE = 2 * TIGHTENING
+#: Limits that a message names, the one that gives most first.
+SHOWN = 3
 #: Slacks below this count as none.
 NONE = 1e-5
 
@@ -70,12 +72,19 @@ class Relaxation:
             given = replace(given, upper=ends[1], lower=ends[-1])
         return replace(task, limits=replace(task.limits, **sizes), quantities=given)
 
+    @property
+    def crowded(self) -> bool:
+        """Whether so many limits give way that another remedy is worth more."""
+        return len(self.widened) > SHOWN
+
     def text(self, growth: float | None) -> str:
-        """What gives way, and with a `growth` that was confirmed, what would do."""
+        """What gives way, and with a `growth` that was confirmed, what would do; of many limits the first alone."""
         parts = []
-        for step in self.widened:
-            would = "" if growth is None else f": {step.least(growth):g} {step.limit.unit} would do"
+        for step in self.widened[:SHOWN]:
+            would = "" if growth is None or self.crowded else f": {step.least(growth):g} {step.limit.unit} would do"
             parts.append(f"{step.limit.name} {step.place}{would}")
+        if self.crowded:
+            parts.append(f"{len(self.widened) - SHOWN} more")
         return ", together with ".join(parts)
 
 
@@ -123,7 +132,9 @@ def relaxed(task: Task, start: Guess) -> Relaxation | None:
     return Relaxation(guess=Guess(points=tuple(points), durations=durations), widened=tuple(found))
 
 
-def refusal(task: Task, reasons: str, status: str, shortest: float | None) -> LimitViolatedError:
+def refusal(
+    task: Task, reasons: str, status: str, shortest: float | None, *, crowded: bool = False
+) -> LimitViolatedError:
     """The error for a task without a motion.
 
     Args:
@@ -131,11 +142,14 @@ def refusal(task: Task, reasons: str, status: str, shortest: float | None) -> Li
         reasons: What limits would have to give way; empty where none is known.
         status: What the first attempt ended with.
         shortest: Duration of the quickest motion inside the limits, s; None where none is known.
+        crowded: Whether more time is to be named before the limits.
     """
     admitted = task.longest if task.duration is None else task.duration
     remedies = [reasons] if reasons else []
     if shortest is not None and shortest > admitted:
-        remedies.append(f"with the limits as they are, {1.001 * shortest:.5g} s would do")
+        remedies.insert(
+            0 if crowded else len(remedies), f"with the limits as they are, {1.001 * shortest:.5g} s would do"
+        )
     if not remedies:
         remedies.append(f"the search stopped with: {status}; start it from elsewhere, or move the waypoints")
     return LimitViolatedError(f"no motion within {admitted:g} s respects the limits: {'; '.join(remedies)}")

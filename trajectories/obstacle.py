@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+#: Length over which the tip of a ball's distance is rounded off, m.
+ROUNDED = 1e-6
+
 
 @dataclass(frozen=True, kw_only=True)
 class HalfSpace:
@@ -50,9 +53,10 @@ class Ball:
             raise ValueError(f"a ball needs a positive radius: got {self.radius} m for {self.name}")
 
     def clearance(self, point: Any) -> Any:
-        """(|p - c|² - r²) / 2r, m: smooth, the distance to the surface near it, and negative inside."""
+        """Distance to the surface, m, negative inside; smooth at the centre too, where it is off by `ROUNDED`."""
         squared = sum((point[i] - c) ** 2 for i, c in enumerate(self.centre))
-        return (squared - self.radius**2) / (2 * self.radius)
+        # both roots are shifted alike: the zero stays exactly at the surface
+        return (squared + ROUNDED**2) ** 0.5 - (self.radius**2 + ROUNDED**2) ** 0.5
 
 
 Obstacle = HalfSpace | Ball

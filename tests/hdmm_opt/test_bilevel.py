@@ -11,13 +11,13 @@ from test_crane_dynamics import Closed
 from hdmm_opt import study
 from hdmm_opt.bilevel import bilevel
 from hdmm_opt.cli import main
-from hdmm_opt.crane_task import drive_quantities, joint_limits, tool_function
+from hdmm_opt.crane_task import crane_cost, drive_quantities, joint_limits, tool_function
 from hdmm_opt.errors import InvalidInputError
-from hdmm_opt.job import Job, Move
+from hdmm_opt.job import Job, Move, carried_out
 from hdmm_opt.motion_file import document
 from hdmm_opt.motion_study import MotionStudy
 from hdmm_opt.plants.crane import tool as place
-from trajectories import LimitViolatedError, violations
+from trajectories import Ball, LimitViolatedError, violations
 
 START, PLACE = (0.2, -1.2, 0.2), (3.0, 2.2)
 JOB = Job(start=START, moves=(Move(tool=PLACE, payload=60.0),), longest=40.0)
@@ -155,13 +155,13 @@ def test_wrong_studies_say_what_would_do(old, new, message):
 
 def test_what_cannot_be_done_names_the_move(tmp_path):
     far = Job(start=START, moves=(Move(tool=PLACE), Move(tool=(9.0, 9.0))))
-    with pytest.raises(LimitViolatedError, match=r"move 2: the tool cannot reach \(9, 9\) m"):
+    with pytest.raises(LimitViolatedError, match=r"move 2: no posture with the tool at \(9, 9\) m was found"):
         bilevel(far, 2)
     with pytest.raises(InvalidInputError, match="one of the two"):
         Move()
     with pytest.raises(InvalidInputError, match="no places to pass"):
         bilevel(Job(start=START, moves=(Move(tool=PLACE, via=((3.0, 1.0),)),)), 2)
-    with pytest.raises(InvalidInputError, match="move 1: a motion goes from one place to another"):
+    with pytest.raises(InvalidInputError, match="move 1: the joints go from one place to another"):
         bilevel(Job(start=START, moves=(Move(joints=START),)), 2)
     here = (float(place(START)[0]), float(place(START)[1]))
     with pytest.raises(InvalidInputError, match="move 1: the tool goes from one place to another"):
@@ -170,3 +170,30 @@ def test_what_cannot_be_done_names_the_move(tmp_path):
     path.write_text(FILE.replace("tool_m = [3.0, 2.2]", "tool_m = [9.0, 9.0]"))
     result = CliRunner().invoke(main, ["trajectory", str(path)])
     assert result.exit_code == 2 and "mine: move 1: the tool cannot reach (9, 9) m; move the place" in result.output
+
+
+def test_a_move_to_nowhere_or_into_an_obstacle_is_refused_at_once():
+    post = Ball(name="post", centre=(3.0, 1.0), radius=0.2)
+    start = (0.3, -1.2, 0.3)
+    here = tuple(float(v) for v in tool_function()(start).full().ravel())
+    for move, words in (
+        (Move(joints=(0.3, -1.2, 0.3 + 1e-15)), "they are at"),
+        (Move(tool=(3.0, 1.1)), "keeps clear of post"),
+        (Move(tool=(3.2, 1.5), via=(here,)), "it is at"),
+        (Move(tool=(3.2, 1.5), via=((3.1, 1.0),)), "keeps clear of post"),
+    ):
+        with pytest.raises(InvalidInputError, match=words):
+            carried_out(Job(start=start, moves=(move,), obstacles=(post,)), lambda payload: crane_cost(), "none")
+
+
+def test_postures_of_reachable_places_are_found():
+    """Places of the tool at random joint coordinates are reachable; from one start all are found."""
+    random = np.random.default_rng(5)
+    job = Job(start=(0.3, -1.2, 0.3), moves=())
+    low, high = job.limits.room
+    for _ in range(60):
+        w = low + (high - low) * random.uniform(0.02, 0.98, 3)
+        place = tool_function()(w).full().ravel()
+        found = job.near(place, np.array(job.start))
+        assert job.limits.holds(found)
+        np.testing.assert_allclose(tool_function()(found).full().ravel(), place, atol=1e-9)
