@@ -247,7 +247,8 @@ def _draws(problem: MachineProblem, count: int, seed: int) -> list[MachineScenar
         shares = random.choice((-1.0, 1.0), len(names)) if k % 2 else random.uniform(-1, 1, len(names))
         made.append(MachineScenario(
             name=f"draw-{k}", payload=float(random.uniform(low, high)),
-            parameters=dict(zip(names, map(float, shares), strict=True)), noise=1.0, seed=seed + 1000 + k,
+            parameters=dict(zip(names, map(float, shares), strict=True)), noise=1.0,
+            initial=float(random.uniform(-1, 1)), seed=seed + 1000 + k,
         ))  # fmt: skip
     return made
 

@@ -185,7 +185,7 @@ def machine_scenarios(study: MachineStudy) -> list[MachineScenario]:
     return [
         MachineScenario(
             name=s.name, payload=middle if s.payload_kg is None else s.payload_kg, parameters=s.parameters,
-            noise=s.noise, quantisation=s.quantisation,
+            noise=s.noise, quantisation=s.quantisation, initial=s.initial,
             faults={joint: Fault(**fault.model_dump()) for joint, fault in s.faults.items()},
             seed=study.tuning.seed + k,
         )

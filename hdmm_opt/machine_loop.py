@@ -35,6 +35,7 @@ class MachineScenario:
         parameters: Position of parameters in their tolerance, -1 … 1, by "joint.parameter" or by "parameter" for all.
         noise: Share of the assumed measurement errors, uniformly distributed, 0 … 1.
         quantisation: Share of the encoder's assumed error that is its rounding, 0 … 1.
+        initial: Position of every joint's first error in its assumed range, -1 … 1.
         faults: What goes wrong with the actuators, by joint.
         seed: Seed of the noise.
     """
@@ -44,6 +45,7 @@ class MachineScenario:
     parameters: Mapping[str, float] = field(default_factory=dict)
     noise: float = 0.0
     quantisation: float = 0.0
+    initial: float = 0.0
     faults: Mapping[str, Fault] = field(default_factory=dict)
     seed: int = 0
 
@@ -198,35 +200,40 @@ class MachineLoop:
                 *([] if self.outer is None else [np.asarray(tuned[number] if tuned else ())]),
             ]))  # fmt: skip
         _, governed, inputs, further = self.loop.sizes
-        start = self._start(shared[0])
         n = len(machine.joints)
+        x = np.stack([self._start(shared[0], gains, scenario) for gains, scenario in runs], axis=1)
         z = np.zeros((governed + 2 * inputs + 3 * n + further, len(runs)))
+        firsts = np.cumsum([0, *(len(plant.states) for plant in machine.plants)])
         for i in range(n):
-            z[governed + 2 * inputs + 3 * i] = shared[0, 4 * i]
+            # an observer starts from its first measurement and the reference's speed
+            z[governed + 2 * inputs + 3 * i] = x[firsts[i]]
+            z[governed + 2 * inputs + 3 * i + 1] = shared[0, 4 * i + 1]
         return Batch(
             fixed=np.array(columns).T,
             seeds=np.array([_seed(scenario.seed) for _, scenario in runs], dtype=np.uint64),
-            x=np.repeat(start[:, None], len(runs), axis=1), z=z, shared=shared,
+            x=x, z=z, shared=shared,
             own=lambda run, first, size: np.zeros((0, size)),
         )  # fmt: skip
 
-    def _start(self, first: Array) -> Array:
-        """At rest on the reference, with the currents that the law asks for there."""
+    def _start(self, first: Array, gains: GainSet, scenario: MachineScenario) -> Array:
+        """The start nearest to rest inside the assumed initial errors, with the currents that the law asks for."""
         import casadi as ca
 
-        n = len(self.problem.machine.joints)
+        n, initial = len(self.problem.machine.joints), self.problem.study.uncertainty.initial
         parts = []
-        for i, law in enumerate(self.loop.laws):
+        for i, (name, law) in enumerate(zip(self.problem.machine.joints, self.loop.laws, strict=True)):
             plant = law.plant
             r = first[4 * i : 4 * i + 4]
             load = first[4 * n + i] if self.loop.foreseeing else 0.0
             x = np.zeros(len(plant.states))
-            x[0] = r[0]
+            error = scenario.initial * initial.position
+            target = r[1] - gains[name][0].beta / 2 * error
+            x[0], x[1] = r[0] + error, target + np.clip(-target, -initial.speed, initial.speed)
             terms = law.terms(ca.DM(x), ca.DM(r), ca.DM(list(plant.values().values())), ca.DM([load]))
             for k, row in enumerate(law.governed):
-                following = [j for j, target in enumerate(plant.targets) if target == row]
+                following = [j for j, wanted in enumerate(plant.targets) if wanted == row]
                 if row == 1 and following:
-                    x[following[0]] = float(terms[k])
+                    x[following[0]] = float(terms[k]) - gains[name][1].beta / 2 * (x[1] - target)
             parts.append(x)
         return np.concatenate(parts)
 

@@ -60,6 +60,8 @@ class MachineSection(Section):
             for name in names:
                 if name not in JOINTS:
                     raise ValueError(f"|{where}.{name}|is not a joint of the crane|{nearest(name, JOINTS)}")
+        if len(self.locked) == len(JOINTS):
+            raise ValueError("|locked|must leave a joint that moves: got all of them|unlock one")
         for name, stroke in self.locked.items():
             longest = {"lift": LIFT.stroke, "tilt": TILT.stroke}.get(name, TELESCOPE)
             if not 0 <= stroke <= longest:
@@ -194,6 +196,7 @@ class MachineScenarioSection(Section):
     parameters: dict[str, Share] = Field(default_factory=dict)
     noise: Annotated[float, Field(ge=0, le=1)] = 0.0
     quantisation: Annotated[float, Field(ge=0, le=1)] = 0.0
+    initial: Share = 0.0
     faults: dict[Name, FaultSection] = Field(default_factory=dict)
 
 

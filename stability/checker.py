@@ -41,6 +41,8 @@ MAX_CELLS, MAX_CELL_DIGITS, MAX_VERTICES = 64, 60, 40_000
 MAX_PRODUCTS, MAX_COUPLED = 100_000, 20_000_000
 #: Joints of a machine, and slices of time that its motion may be cut into.
 MAX_JOINTS, MAX_SLICES = 8, 4_000
+#: Names of the parameter that holds a joint's own part of the bodies' inertia.
+OWN = ("load_mass", "load_inertia")
 #: Parts of the ranges of speed and load in which the answer of an acceleration to a load is bounded.
 SPEED_PARTS, LOAD_PARTS = 48, 4
 #: Relative width given to every gain, so that the proof holds for its decimal, its float64 and its float32.
@@ -1866,12 +1868,24 @@ class Machine:
 
     def _own(self, joint: Joint) -> Fraction:
         """The inertia of the bodies that a joint's own model carries."""
-        names = [name for name in ("load_mass", "load_inertia") if name in joint.claim.parameters]
+        names = [name for name in OWN if name in joint.claim.parameters]
+        self._motion(joint)
         need(len(names) == 1, f"{joint.name}: the plant must carry a part of the machine's inertia")
         low, high = joint.claim.parameters[names[0]]
         # parameters are widened by a billionth of a billionth where they have a tolerance; this one has none
         need(low == high, f"{joint.name}: its part of the machine's inertia must be a number")
         return low
+
+    def _motion(self, joint: Joint) -> None:
+        """The first two states must be a position and its rate, and the first virtual control the reference's."""
+        claim = joint.claim
+        operations, outputs = claim.plant["operations"], claim.plant["outputs"]
+        kinematic = operations[outputs[len(claim.rows)]] == ["input", claim.rows[1]["state"]]
+        need(kinematic and joint.loop.mass[0] == ONE, f"{joint.name}: the first state's rate is not the second state")
+        need(claim.rows[1]["target"] == 0, f"{joint.name}: the second state does not follow the first")
+        term = claim.law[0]
+        rate = term["operations"][term["outputs"][0]] == ["input", "r1"]
+        need(rate, f"{joint.name}: the first modelling term is not the reference's rate")
 
     def obligations(self) -> list[Obligation]:
         """Decide what joins the joints."""
@@ -1895,7 +1909,7 @@ class Machine:
         statement = f"what the joints do to each other is inside what each was proved under; the tightest is {which}"
         state("loads", statement, worst, "1", "smaller promises, or gains that are proved under more load")
         spare = self._well_posed()
-        statement = "the accelerations follow from the loads in one way only: the coupling contracts"
+        statement = "inside the promises the accelerations follow from the loads in one way: the coupling contracts"
         state("coupling", statement, spare, "1", "less coupling between the joints, or more inertia of the actuators")
         spare, statement = self._observed()
         state("observer", statement, spare, "1", "an observer that is faster, or a better encoder")
@@ -1953,6 +1967,7 @@ class Machine:
         known = claim.feedforward.get("load_force")
         if known is not None:
             foreseen = all(o[0] <= a[0] and a[1] <= o[1] for a, o in ((load, known[0]), (rate, known[1])))
+            foreseen = foreseen and known[1][0] <= 0 <= known[1][1]  # after its end the reference rests
             load = ZERO if foreseen else symmetric(2 * magnitude(assumed))
         inner = add(load, symmetric(size))
         return min(inner[0] - assumed[0], assumed[1] - inner[1]) / max(magnitude(assumed), Fraction(1, 10**9))
@@ -1973,11 +1988,19 @@ class Machine:
         claim, loop = joint.claim, joint.loop
         program = {**claim.plant, "outputs": [claim.plant["outputs"][len(claim.rows) + 1]]}
         ranges = {name: node.range for name, node in loop.nodes.items()}
-        rate, worst = claim.rows[1]["state"], Fraction(0)
+        rate, worst, least, most = claim.rows[1]["state"], Fraction(0), -Fraction(10**9), Fraction(10**9)
         # friction that changes sides with power makes the slope depend on speed and load: small parts of both
         for speed, load in product(cut(ranges[rate], SPEED_PARTS), cut(ranges["load_force"], LOAD_PARTS)):
             here = {**ranges, rate: speed, "load_force": load}
-            worst = max(worst, magnitude(derivative(program, here, {"load_force": {"": ONE}}).get("", ZERO)))
+            slope = derivative(program, here, {"load_force": {"": ONE}}).get("", ZERO)
+            worst, least, most = max(worst, magnitude(slope)), max(least, slope[1]), min(most, slope[0])
+        inertia = {**claim.plant, "outputs": [claim.plant["outputs"][1]]}
+        name = next(name for name in OWN if name in claim.parameters)
+        weight = derivative(inertia, ranges, {name: {"": ONE}}).get("", ZERO)
+        need(weight[0] > 0, f"{joint.name}: the plant does not carry its part of the machine's inertia")
+        # what a load does without friction is what the own part of the inertia does: -dh/dw = dM/dm
+        matches = most <= -weight[0] and -weight[1] <= least
+        need(matches, f"{joint.name}: the load does not enter the plant as its part of the machine's inertia does")
         return up(worst / loop.mass[1][0])
 
     def _observed(self) -> tuple[Fraction, str]:

@@ -112,6 +112,8 @@ class Loads:
                 own_low, own_high = own * slices.low[2, i], own * slices.high[2, i]
                 load = _hull(low[i] - own_high, high[i] - own_low)
                 rate = _hull(rates[0] - own * slices.high[3, i], rates[1] - own * slices.low[3, i])
+            # after its end the reference rests
+            rate = Interval(min(rate.low, 0.0), max(rate.high, 0.0))
             found.append((_widened(load), _widened(rate)))
         return found
 

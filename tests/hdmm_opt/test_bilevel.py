@@ -169,7 +169,10 @@ def test_what_cannot_be_done_names_the_move(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(FILE.replace("tool_m = [3.0, 2.2]", "tool_m = [9.0, 9.0]"))
     result = CliRunner().invoke(main, ["trajectory", str(path)])
-    assert result.exit_code == 2 and "mine: move 1: the tool cannot reach (9, 9) m; move the place" in result.output
+    assert (
+        result.exit_code == 2
+        and "mine: move 1: no posture with the tool at (9, 9) m was found; move the place" in result.output
+    )
 
 
 def test_a_move_to_nowhere_or_into_an_obstacle_is_refused_at_once():

@@ -222,6 +222,34 @@ def test_a_file_simulates_as_it_was_validated(designed):
     assert again.tool_late == pytest.approx(designed.shown["healthy"].tool_late, rel=1e-9)
 
 
+def _weak_load(d):
+    """The load enters a joint's plant with a hundredth of its size."""
+    program = d["joints"]["lift"]["certificate"]["model"]["plant"]
+    operations, outputs = program["operations"], program["outputs"]
+    operator, rest, load = operations[outputs[3]]
+    assert operator == "sub" and operations[load] == ["input", "load_force"]
+    count = len(operations)
+    operations += [["const", "0.01"], ["mul", load, count], ["sub", rest, count + 1]]
+    outputs[3] = count + 2
+
+
+def test_a_load_that_hardly_enters_a_plant_is_refused(designed):
+    document = copy.deepcopy(designed.document)
+    _weak_load(document)
+    report = judged(document)
+    assert report.status == 2 and "does not enter the plant as its part of the machine's inertia" in report.message
+
+
+def test_a_load_that_reads_no_acceleration_still_answers_for_the_own_inertia(designed):
+    document = copy.deepcopy(designed.document)
+    loads = document["certificate"]["loads"]
+    own = document["joints"]["telescope"]["study"]["uncertainty"]["disturbances"]["load_force"]
+    loads["operations"].append(["const", repr(own[0] + 10.0)])
+    loads["outputs"][2] = len(loads["operations"]) - 1
+    report = judged(document)
+    assert report.status == 1 and "loads" in report.message
+
+
 def _another_tool(d):
     d["certificate"]["tool"]["operations"][0] = ["const", "0.5"]
 
@@ -328,6 +356,39 @@ def test_the_coupled_loop_is_that_of_an_independent_integration(tmp_path):
         state = solve_ivp(rate, (0, problem.period), state, args=(u,), rtol=1e-10, atol=1e-12).y[:, -1]
     assert np.abs(trace.x[:, :400] - trace.r[:, :400]).max() > 1e-4
     assert worst < 1e-8
+
+
+def test_observers_hold_from_every_start(tmp_path):
+    """A joint that starts off its reference moves at once: the observer's start must allow for it."""
+    data = serial_study(2, tmp_path)
+    data["controller"]["observer"] = {"bandwidth_rad_s": 400.0, "largest": 0.05, "epsilon": 1.0, "sigma": 10.0}
+    data["uncertainty"] |= {"noise": {"position": 1e-7}, "initial": {"position": 1e-4, "speed": 1e-5}}
+    data["validation"]["scenarios"] = [
+        {"name": "off", "initial": 1.0},
+        {"name": "other", "initial": -1.0, "noise": 1.0},
+    ]
+    result = design_machine(study_from(data), Options(), Progress())
+    assert result.document is not None, result.verdicts
+    for name, figures in result.shown.items():
+        for k, joint in enumerate(result.problem.machine.joints):
+            noise = result.document["joints"][joint]["study"]["uncertainty"]["noise"]
+            position, speed = figures.estimates[k]
+            assert position <= noise["position"] and speed <= noise["speed"], name
+            assert figures.joints_ever[k] >= 0.99e-4
+
+
+def test_what_sits_on_a_link_goes_with_it():
+    """Joints that a study does not name stand still; their bodies stay in the arm."""
+    whole = assemble_machine(study_from(quick_arm()))
+    data = quick_arm()
+    for section in (data["plant"]["joints"], data["controller"]["joints"], data["requirements"]["joint_error"]):
+        section.pop("telescope")
+    data["reference"]["waypoints"] = [place[:2] for place in data["reference"]["waypoints"]]
+    fewer = assemble_machine(study_from(data))
+    at = [0.3, -1.8]
+    three = np.array(whole.machine.forces([*at, 0.0], [0] * 3, [0] * 3, 10.0)).ravel()
+    two = np.array(fewer.machine.forces(at, [0] * 2, [0] * 2, 0.0)).ravel()
+    assert two[0] > 0.9 * three[0] > 5e3
 
 
 def test_a_locked_joint_leaves_the_law_of_the_others_as_it_is():
