@@ -20,7 +20,7 @@ from .errors import InvalidInputError
 from .files import check_writable, write_text
 from .machine_again import machine_of
 from .machine_design import MachineDesign, design_machine, exchanged, rejected_machine
-from .machine_file import assumed
+from .machine_file import assumed_text
 from .machine_gains import covered, machine_scenarios
 from .machine_loop import MachineFigures, MachineLoop, MachineTrace
 from .machine_problem import MachineProblem, assemble_machine
@@ -130,7 +130,7 @@ def _summary(result: MachineDesign) -> None:
             seen = shown["estimates"][name]["speed"]
             click.echo(f"    speed estimate: certified {noise * 1e3:.4g} mm/s, simulated {seen * 1e3:.4g}", err=True)
     _figures(problem, result.shown)
-    click.echo(f"assumed, to be replaced by yours: {', '.join(assumed(problem))}", err=True)
+    click.echo(f"assumed, to be replaced by yours: {assumed_text(problem)}", err=True)
 
 
 def run_machine_simulate(
@@ -246,7 +246,7 @@ def run_compare(study: Any, output: Path | None, options: Options) -> int:
     table(found, inside, click.echo)
     each = budget[0] * (budget[1] + 1)
     click.echo(f"{each} candidates for each, on the same scenarios; * least RMS error of the tool", err=True)
-    click.echo(f"assumed, to be replaced by yours: {', '.join(assumed(problem))}", err=True)
+    click.echo(f"assumed, to be replaced by yours: {assumed_text(problem)}", err=True)
     if output is not None:
         rows = [
             {"name": c.name, "gains": dict(c.gains), "cost": _plain(c.cost), "candidates": c.evaluations,

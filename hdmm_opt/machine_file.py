@@ -52,6 +52,19 @@ def assumed(problem: MachineProblem) -> tuple[str, ...]:
     return tuple(found)
 
 
+def assumed_text(problem: MachineProblem) -> str:
+    """The same in one line, with the joints of each parameter in brackets."""
+    joints: dict[str, list[str]] = {}
+    for name in assumed(problem):
+        joint, _, key = name.rpartition(".")
+        joints.setdefault(key, []).append(joint)
+    whole = list(problem.machine.joints)
+    return ", ".join(
+        key if own == [""] else f"{key} ({'all joints' if own == whole else ', '.join(own)})"
+        for key, own in joints.items()
+    )
+
+
 def _plant(problem: MachineProblem, k: int) -> dict[str, Any]:
     plant = problem.machine.plants[k]
     return {"model": plant.name, "level": plant.level, **plant_data(plant)}

@@ -12,6 +12,7 @@ from machines import bundled, quick_arm, serial_study, study_from
 from scipy.integrate import solve_ivp
 
 from hdmm_opt import gain_file
+from hdmm_opt.compare import compare, table
 from hdmm_opt.errors import InvalidInputError
 from hdmm_opt.machine import crane
 from hdmm_opt.machine_again import machine_of
@@ -429,6 +430,18 @@ def test_rod_forces_are_the_joints_torques_over_their_levers():
             np.array(part).ravel() for part in both(at, random.normal(size=3) * 0.2, random.normal(size=3))
         )
         np.testing.assert_allclose(force * arm, torque, rtol=1e-9, atol=1e-6)
+
+
+def test_rivals_are_tuned_on_equal_terms_and_track(designed):
+    found = compare(designed.problem, (4, 1), 1, Options(), Progress())
+    assert [c.name for c in found] == ["rac, jaya", "rac, tlbo", "rise, jaya", "tde-nftsm, jaya"]
+    assert all(c.figures["two-degraded"].tool_late < 0.02 for c in found)
+    assert {c.evaluations for c in found} <= {4, 8}
+    assert [c.certified is None for c in found] == [False, False, True, True]
+    lines = []
+    table(found, ["healthy", "two-degraded"], lines.append)
+    assert len(lines) == 1 + 4 * len(found) and sum("*" in line for line in lines) >= 3
+    assert not any("one-stuck" in line and f"{1e3 * found[0].certified:.4g}" in line for line in lines)
 
 
 def test_slices_cover_the_references(designed):
