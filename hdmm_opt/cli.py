@@ -94,7 +94,7 @@ def _options(jobs: int, cluster: str | None, seed: int | None, resume: bool, bud
 @click.option(
     "--exchange",
     nargs=2,
-    type=(click.Path(path_type=Path, exists=True), str),
+    type=(click.Path(path_type=Path), str),
     metavar="FILE JOINT",
     help="For a machine: take FILE's proofs, and prove anew only JOINT, whose actuator is another in STUDY.",
 )
@@ -111,13 +111,23 @@ def design(
 @main.command()
 @click.argument("study")
 @click.option("-o", "output", type=click.Path(path_type=Path), help="JSON file for gains and figures of all.")
-@_work
-def compare(study: str, output: Path | None, **work: Any) -> None:
+@click.option("--seed", type=click.IntRange(0), help="Seed of the searches; that of the study by default.")
+@click.option(
+    "--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Processes for the law's search."
+)
+@click.option(
+    "--budget",
+    type=click.Choice(["quick", "full"]),
+    default="quick",
+    show_default=True,
+    help="Candidates for each controller; quick: as the study says; full: 50 x 101.",
+)
+def compare(study: str, output: Path | None, seed: int | None, jobs: int, budget: str) -> None:
     """Compare the law with its rivals on STUDY, a machine: equal tuning budget, same scenarios, same inner loops."""
     from .machine_commands import run_compare
     from .study import load_any
 
-    sys.exit(run_compare(load_any(study), output, _options(**work)))
+    sys.exit(run_compare(load_any(study), output, _options(jobs, None, seed, False, budget)))
 
 
 @main.command()

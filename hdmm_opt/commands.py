@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -58,7 +59,7 @@ def run_design(
     if result.document is None:
         write_text(rejected, gain_file.to_text(pipeline.rejected_document(chosen, result)))
         state.unlink(missing_ok=True)
-        _explain(chosen.study.name, result, rejected)
+        explain(chosen.study.name, result, rejected)
         if target.exists():
             click.echo(f"  {target} is from an earlier run, not of this design; it was left as it is", err=True)
         return NOT_PROVED
@@ -82,8 +83,15 @@ def _prepare_folder(folder: Path) -> None:
     check_writable(folder / "report.html")
 
 
-def _explain(name: str, result: pipeline.Design, left: Path) -> None:
-    """Say what failed, by how much, and what would do."""
+def explain(name: str, result: Any, left: Path, simulated: Callable[[], None] = lambda: None) -> None:
+    """Say what failed, by how much, and what would do.
+
+    Args:
+        name: Name of the study.
+        result: A refused design, with its report, verdicts and missed requirements.
+        left: What it left behind.
+        simulated: Called to say what simulations showed, where that is of use.
+    """
     proved = result.report is not None and result.report.status == PROVED
     what = "proved, but a requirement is missed" if proved else "not proved"
     click.echo(f"{name}: {what}; no gain file written", err=True)
@@ -95,6 +103,7 @@ def _explain(name: str, result: pipeline.Design, left: Path) -> None:
             click.echo(f"    {'would pass' if verdict.sure else 'would help'}: {verdict.remedy}", err=True)
     for line in result.missed[:5]:
         click.echo(f"  requirement missed: {line}", err=True)
+    simulated()
     click.echo(f"  details: {left}", err=True)
 
 

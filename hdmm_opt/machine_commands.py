@@ -16,6 +16,7 @@ import click
 
 from . import gain_file
 from .cli import NOT_PROVED, PROVED
+from .commands import explain
 from .errors import InvalidInputError
 from .files import check_writable, write_text
 from .machine_again import machine_of
@@ -48,7 +49,7 @@ def run_machine_design(study: MachineStudy, target: Path, options: Options, exch
             result = exchanged(document, study, exchange[1], options, progress)
     if result.document is None:
         write_text(rejected, gain_file.to_text(rejected_machine(result)))
-        _explain(study, result, rejected)
+        explain(study.study.name, result, rejected, lambda: _simulated(result))
         if target.exists():
             click.echo(f"  {target} is from an earlier run, not of this design; it was left as it is", err=True)
     else:
@@ -73,21 +74,9 @@ def _proved_machine(path: Path) -> dict[str, Any]:
     return document
 
 
-def _explain(study: MachineStudy, result: MachineDesign, left: Path) -> None:
-    proved = result.report is not None and result.report.status == PROVED
-    what = "proved, but a requirement is missed" if proved else "not proved"
-    click.echo(f"{study.study.name}: {what}; no gain file written", err=True)
-    for verdict in result.verdicts[:6]:
-        margin = f"{verdict.margin:.4g} {verdict.unit}" if math.isfinite(verdict.margin) else "unknown"
-        click.echo(f"  {verdict.verdict}: {verdict.name} (margin {margin})", err=True)
-        click.echo(f"    {verdict.statement}", err=True)
-        if verdict.remedy:
-            click.echo(f"    {'would pass' if verdict.sure else 'would help'}: {verdict.remedy}", err=True)
-    for line in result.missed[:5]:
-        click.echo(f"  requirement missed: {line}", err=True)
+def _simulated(result: MachineDesign) -> None:
     click.echo("what simulation says (it proves nothing):", err=True)
     _figures(result.problem, result.shown)
-    click.echo(f"  details: {left}", err=True)
 
 
 def _figures(problem: MachineProblem, shown: Mapping[str, MachineFigures]) -> None:

@@ -8,10 +8,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from machines import bundled, quick_arm, serial_study, study_from
 from scipy.integrate import solve_ivp
 
 from hdmm_opt import gain_file
+from hdmm_opt.cli import main
 from hdmm_opt.compare import compare, table
 from hdmm_opt.errors import InvalidInputError
 from hdmm_opt.machine import crane
@@ -494,3 +496,29 @@ def test_bad_studies_are_one_line(key):
     with pytest.raises(InvalidInputError) as caught:
         assemble_machine(study_from(data))
     assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_verbs_of_machines(designed, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run = CliRunner()
+    path = tmp_path / "arm.gains.json"
+    path.write_text(gain_file.to_text(designed.document), encoding="utf-8")
+    assert run.invoke(main, ["check", str(path)]).exit_code == 0
+    shown = run.invoke(main, ["simulate", str(path), "--scenario", "two-degraded", "--csv", "a.csv", "--json"])
+    assert shown.exit_code == 0 and json.loads(shown.stdout)["two-degraded"]["tool_late"] < 0.02
+    assert (tmp_path / "a.csv").read_text().startswith("time [s],lift [rad],lift reference [rad]")
+    stuck = run.invoke(main, ["simulate", str(path), "--scenario", "one-stuck"])
+    assert stuck.exit_code == 0 and "outside the assumptions" in stuck.stderr
+    told = run.invoke(main, ["trajectory", "arm-p3"])
+    assert told.exit_code == 0 and "beside an inertia of" in told.stdout
+    for arguments, words in (
+        (["simulate", str(path), "--scenario", "none"], 'no scenario "none"'),
+        (["falsify", str(path)], "got a machine"),
+        (["compare", "emla-p2"], "rivals are built for machines"),
+        (["sweep", "arm-p3", "--vary", "controller.rate_hz=1,2"], "a machine of several joints"),
+        (["design", "arm-p3", "--exchange", "none.json", "lift"], "none.json: unreadable"),
+        (["design", "arm-p3", "--exchange", str(path), "elbow"], "names one of the joints"),
+        (["design", "arm-p3", "--report", "r"], "--report is made for one actuator"),
+    ):
+        found = run.invoke(main, arguments)
+        assert found.exit_code == 2 and words in found.stderr and len(found.stderr.strip().splitlines()) == 1
