@@ -22,6 +22,7 @@ from .machine_gains import (
     covered,
     machine_cost,
     machine_scenarios,
+    named_gains,
     starting_gains,
     tuned_gains,
     uses,
@@ -106,18 +107,10 @@ def _law(
     parts = [(m.tool_rms, m.itae) for m in shown[: len(chosen)]]
     bound = None if isinstance(tuned.contracts, Failure) else uses(problem, tuned.contracts)[-1][1]
     return Contender(
-        name=f"rac, {method}", gains=_named(tuned.gains), cost=machine_cost(problem, parts, None),
+        name=f"rac, {method}", gains=named_gains(tuned.gains), cost=machine_cost(problem, parts, None),
         evaluations=tuned.evaluations, certified=bound,
         figures={s.name: m for s, m in zip(scenarios, shown[len(chosen) :], strict=True)},
     )  # fmt: skip
-
-
-def _named(gains: GainSet) -> dict[str, float]:
-    kinds = ("beta", "epsilon", "delta", "sigma")
-    return {
-        f"{joint}.{kind}_{k + 1}": getattr(row, kind)
-        for joint, rows in gains.items() for k, row in enumerate(rows) for kind in kinds
-    }  # fmt: skip
 
 
 def _rival(
@@ -177,9 +170,9 @@ def table(found: Sequence[Contender], proved: Sequence[str], writes: Callable[[s
             sound = not math.isfinite(m.lost)
             mark = "*" if sound and m.tool_rms == best else " "
             size = (
-                f"{1e3 * m.tool_late:10.4g}{1e3 * m.tool_rms:9.4g}{mark}"
+                f"{1e3 * m.tool_late:12.3g}{1e3 * m.tool_rms:12.3g}{mark}"
                 if sound
-                else f"{f'lost at {m.lost:.3g} s':>20}"
+                else f"{f'lost at {m.lost:.3g} s':>25}"
             )
             bound = "" if c.certified is None or scenario not in proved else f"{1e3 * c.certified:.4g}"
             writes(f"{scenario:16}{c.name:17}{size}{max(m.uses):11.3g}{bound:>16}")

@@ -20,7 +20,7 @@ from .commands import explain
 from .errors import InvalidInputError
 from .files import check_writable, write_text
 from .machine_again import machine_of
-from .machine_design import MachineDesign, design_machine, exchanged, rejected_machine
+from .machine_design import MachineDesign, design_machine, exchanged, figures_data, rejected_machine
 from .machine_file import assumed_text
 from .machine_gains import covered, machine_scenarios
 from .machine_loop import MachineFigures, MachineLoop, MachineTrace
@@ -143,7 +143,7 @@ def run_machine_simulate(
     if csv_path is not None:
         write_text(csv_path, _csv(problem, loop.trace(gains, offered[chosen[0]])))
     if as_json:
-        plain = {key: {k: _plain(v) for k, v in asdict(m).items()} for key, m in found.items()}
+        plain = {key: figures_data(m) for key, m in found.items()}
         click.echo(json.dumps(plain, indent=1))
     else:
         for key, m in found.items():
@@ -161,12 +161,6 @@ def run_machine_simulate(
     for line in missed:
         click.echo(f"requirement missed: {line}", err=True)
     return NOT_PROVED if missed else PROVED
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return [_plain(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _csv(problem: MachineProblem, trace: MachineTrace) -> str:
@@ -238,9 +232,9 @@ def run_compare(study: Any, output: Path | None, options: Options) -> int:
     click.echo(f"assumed, to be replaced by yours: {assumed_text(problem)}", err=True)
     if output is not None:
         rows = [
-            {"name": c.name, "gains": dict(c.gains), "cost": _plain(c.cost), "candidates": c.evaluations,
-             "certified_m": c.certified, "scenarios": {k: {f: _plain(v) for f, v in asdict(m).items()}
-                                                       for k, m in c.figures.items()}}
+            {"name": c.name, "gains": dict(c.gains), "cost": c.cost if math.isfinite(c.cost) else None,
+             "candidates": c.evaluations, "certified_m": c.certified,
+             "scenarios": {k: figures_data(m) for k, m in c.figures.items()}}
             for c in found
         ]  # fmt: skip
         data = {"schema": SCHEMA, "study": study.model_dump(mode="json", exclude_none=True), "controllers": rows}

@@ -25,6 +25,7 @@ from .machine_gains import (
     bandwidths,
     covered,
     machine_scenarios,
+    named_gains,
     shortfall,
     starting_gains,
     tuned_gains,
@@ -34,7 +35,7 @@ from .machine_gains import (
 from .machine_loop import MachineFigures, MachineLoop, MachineScenario
 from .machine_problem import MachineProblem, assemble_machine, tool_errors
 from .machine_study import MachineStudy
-from .pipeline import FULL, provenance
+from .pipeline import FULL, from_checker, provenance, verdicts_data
 from .proof import Verdict
 from .selection import Options, Progress
 from .state import State
@@ -117,16 +118,9 @@ def _finished(
     document = build_machine(problem, tuned.gains, tuned.contracts, section, made, kept=kept)
     finished, report = gain_file.prove(document)
     missed = tuple(_missed(problem, shown))
-    failed = [
-        Verdict(name=o.name, statement=o.statement, margin=o.margin, unit=o.unit, verdict=o.verdict, remedy=o.remedy,
-                sure=True)
-        for o in report.obligations if o.verdict != "proved"
-    ]  # fmt: skip
-    if report.status and not failed:
-        failed = [Verdict(name="exact check", statement=report.message, margin=-1.0, unit="1", verdict="undecided")]
     accepted = report.status == 0 and not missed
     return MachineDesign(
-        document=finished if accepted else None, report=report, verdicts=tuple(failed), missed=missed,
+        document=finished if accepted else None, report=report, verdicts=tuple(from_checker(report)), missed=missed,
         gains=tuned.gains, shown=by_name, problem=problem,
     )  # fmt: skip
 
@@ -219,19 +213,21 @@ def validated_machine(
             for k, name in enumerate(joints) if inside and inside[0].estimates
         },
         "scenarios": [
-            {"name": s.name, "covered": covered(problem, s), **_finite(asdict(m))} for s, m in runs
+            {"name": s.name, "covered": covered(problem, s), **figures_data(m)} for s, m in runs
         ],
     }  # fmt: skip
     return runs, section
 
 
-def _finite(data: dict[str, Any]) -> dict[str, Any]:
-    def plain(value: Any) -> Any:
-        if isinstance(value, tuple | list):
-            return [plain(v) for v in value]
-        return None if isinstance(value, float) and not math.isfinite(value) else value
+def figures_data(figures: MachineFigures) -> dict[str, Any]:
+    """Figures as JSON data; what is not finite, in a run that was lost, is null."""
 
-    return {key: plain(value) for key, value in data.items()}
+    def plain(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return [plain(v) for v in value]
+        return value if math.isfinite(value) else None
+
+    return {key: plain(value) for key, value in asdict(figures).items()}
 
 
 def _draws(problem: MachineProblem, count: int, seed: int) -> list[MachineScenario]:
@@ -355,17 +351,9 @@ def rejected_machine(result: MachineDesign) -> dict[str, Any]:
     return {
         "schema": gain_file.REJECTED,
         "study": result.problem.study.model_dump(mode="json", exclude_none=True),
-        "gains": [
-            {"name": f"{name}.{kind}_{k + 1}", "value": getattr(row, kind)}
-            for name, rows in result.gains.items() for k, row in enumerate(rows)
-            for kind in ("beta", "epsilon", "delta", "sigma")
-        ],
-        "obligations": [
-            {"name": v.name, "statement": v.statement, "margin": v.margin if math.isfinite(v.margin) else None,
-             "unit": v.unit, "verdict": v.verdict, "remedy": v.remedy, "witness": v.witness}
-            for v in result.verdicts
-        ],
+        "gains": [{"name": name, "value": value} for name, value in named_gains(result.gains).items()],
+        "obligations": verdicts_data(result.verdicts),
         "missed": list(result.missed),
-        "simulated": {name: _finite(asdict(m)) for name, m in result.shown.items()},
+        "simulated": {name: figures_data(m) for name, m in result.shown.items()},
         "assumed": list(assumed(result.problem)),
     }  # fmt: skip

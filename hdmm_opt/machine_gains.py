@@ -13,15 +13,14 @@ from stability import Failure, Gains, error_rows
 from stability.network import Contract
 from tuning import Budget, Outcome, Population, best_of
 from tuning import search as run_search
-from tuning.decimals import rounded
 
-from .axis import Axis
+from .axis import KINDS, Axis
 from .errors import InvalidInputError
 from .machine_loop import MachineLoop, MachineScenario
 from .machine_problem import MachineProblem, assemble_machine, tool_errors
 from .machine_study import MachineStudy
 from .plants.rigid_joint import healthy
-from .selection import Options, Progress, kept_population, to_data
+from .selection import SHORT_DIGITS, Options, Progress, kept_population, to_data, with_digits
 from .simulation import Fault
 from .state import State
 from .workers import workers
@@ -52,14 +51,12 @@ class Tuned:
         contracts: The joints' proofs, or why there are none.
         evaluations: Candidates that were looked at.
         runs: Closed-loop runs that were spent.
-        cost: Closed-loop cost; infinite where nothing was searched.
     """
 
     gains: GainSet
     contracts: dict[str, Contract] | Failure
     evaluations: int
     runs: int = 0
-    cost: float = math.inf
 
 
 def shortfall(problem: MachineProblem, contracts: Mapping[str, Contract] | Failure, gains: GainSet) -> float:
@@ -308,29 +305,23 @@ def tuned_gains(
             method, pool.map, window.local(start), population, seed, allowed,
             restored=kept_population(state), after=after,
         )  # fmt: skip
-    best = best_of(found)
     gains = gains_of_point(problem, window.at(found.points[found.best]))
-    for digits in (2, 3):
-        short = _shortened(problem, gains, digits)
-        contracts = problem.composed(short)
-        if best is not None and shortfall(problem, contracts, short) == 0.0:
-            gains = short
+    contracts = problem.composed(gains)
+    for digits in SHORT_DIGITS if best_of(found) is not None else ():
+        short = {
+            name: with_digits(axis, gains[name], digits)
+            for name, axis in zip(problem.machine.joints, problem.axes, strict=True)
+        }
+        proofs = problem.composed(short)
+        if shortfall(problem, proofs, short) == 0.0:
+            gains, contracts = short, proofs
             break
-    return Tuned(
-        gains=gains, contracts=problem.composed(gains), evaluations=found.evaluations, runs=found.runs,
-        cost=math.inf if best is None else best.outcome.cost,
-    )  # fmt: skip
+    return Tuned(gains=gains, contracts=contracts, evaluations=found.evaluations, runs=found.runs)
 
 
-def _shortened(problem: MachineProblem, gains: GainSet, digits: int) -> GainSet:
-    """Searched gains as shorter decimals inside their ranges."""
-    found = {}
-    for name, axis in zip(problem.machine.joints, problem.axes, strict=True):
-        values = [getattr(g, kind) for g in gains[name] for kind in ("beta", "epsilon", "delta", "sigma")]
-        for i in axis.searched:
-            values[i] = rounded(values[i], digits, axis.ranges[i].low, axis.ranges[i].high)
-        found[name] = tuple(
-            Gains(beta=values[k], epsilon=values[k + 1], delta=values[k + 2], sigma=values[k + 3])
-            for k in range(0, len(values), 4)
-        )
-    return found
+def named_gains(gains: GainSet) -> dict[str, float]:
+    """Gains by "joint.name"."""
+    return {
+        f"{joint}.{kind}_{k + 1}": getattr(row, kind)
+        for joint, rows in gains.items() for k, row in enumerate(rows) for kind in KINDS
+    }  # fmt: skip

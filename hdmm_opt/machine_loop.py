@@ -17,12 +17,11 @@ from .machine_problem import MachineProblem
 from .plants.rigid_joint import healthy
 from .simulation import Batch, Engine, Fault, Yardstick
 from .simulation.coupled import Coupled, compose_machine
+from .simulation.loop import seed_of, steps_of
+from .simulation.scenario import fault_column
 
 Array = NDArray[np.float64]
 GainSet = Mapping[str, tuple[Gains, ...]]
-
-#: Longest integration step as a share of the fastest time constant of a joint's plant.
-STEP_SHARE = 0.35
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,10 +119,11 @@ class MachineLoop:
         study, self.problem, self.outer = problem.study, problem, outer
         section, noise = study.controller.observer, study.uncertainty.noise
         self.noise = (noise.position, 0.0 if section else noise.speed, noise.current_a)
+        substeps = max(steps_of(plant, problem.period, 0.0) for plant in problem.machine.plants)
         self.loop = Coupled(
             machine=problem.machine, laws=tuple(axis.law for axis in problem.axes), outer=outer,
             observer=problem.observer, adapting=(section.epsilon, section.sigma) if section else (0.0, 1.0),
-            noise=self.noise, foreseeing=problem.foreseeing, period=problem.period, substeps=_substeps(problem),
+            noise=self.noise, foreseeing=problem.foreseeing, period=problem.period, substeps=substeps,
             yardstick=Yardstick(
                 transient=study.validation.transient_s, band=study.requirements.tool_error_m, transmission=1.0
             ),
@@ -195,7 +195,7 @@ class MachineLoop:
                 [scenario.payload],
                 np.array(self.noise) * scenario.noise * np.array([1 - scenario.quantisation, 1.0, 1.0]),
                 [2 * self.noise[0] * scenario.quantisation],
-                *(_fault(scenario.faults.get(name), len(plant.inputs))
+                *(fault_column(scenario.faults.get(name), len(plant.inputs))
                   for name, plant in zip(machine.joints, machine.plants, strict=True)),
                 *([] if self.outer is None else [np.asarray(tuned[number] if tuned else ())]),
             ]))  # fmt: skip
@@ -210,7 +210,7 @@ class MachineLoop:
             z[governed + 2 * inputs + 3 * i + 1] = shared[0, 4 * i + 1]
         return Batch(
             fixed=np.array(columns).T,
-            seeds=np.array([_seed(scenario.seed) for _, scenario in runs], dtype=np.uint64),
+            seeds=np.array([seed_of(scenario.seed) for _, scenario in runs], dtype=np.uint64),
             x=x, z=z, shared=shared,
             own=lambda run, first, size: np.zeros((0, size)),
         )  # fmt: skip
@@ -279,25 +279,3 @@ class MachineLoop:
             estimates=tuple(zip(each("estimated position"), each("estimated speed"), strict=True)) if watched else (),
             lost=lost,
         )
-
-
-def _substeps(problem: MachineProblem) -> int:
-    """Integration steps in a period, from the fastest time constant of the plants at nominal parameters."""
-    import casadi as ca
-
-    fastest = 0.0
-    for plant in problem.machine.plants:
-        jacobian = ca.Function("J", [plant.x, plant.u, plant.w, plant.p], [ca.jacobian(plant.rate, plant.x)])
-        at = [0.3, 0.05] + [0.0] * (len(plant.states) - 2)
-        values = np.array(jacobian(at, 0, 0, list(plant.values().values())))
-        fastest = max(fastest, float(np.abs(np.linalg.eigvals(values)).max()))
-    return max(2, math.ceil(problem.period * fastest / STEP_SHARE))
-
-
-def _fault(fault: Fault | None, inputs: int) -> Array:
-    found = fault or Fault(share=0.0, start_s=0.0, rate_1_s=0.0)
-    return np.array([found.share, found.start_s, found.rate_1_s, *found.stuck, *[0.0] * (inputs - len(found.stuck))])
-
-
-def _seed(seed: int) -> int:
-    return int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])

@@ -110,8 +110,9 @@ class MachineProblem:
 
     def alone(self, gains: Mapping[str, tuple[Gains, ...]]) -> Failure | None:
         """Why a joint cannot be proved even where its neighbours keep to their references."""
+        assumed = self.assume(still(self.machine.joints))
         for name, axis in zip(self.machine.joints, self.axes, strict=True):
-            found = certify_sampled(axis.model, self.assume(still(self.machine.joints))[name], gains[name], axis.box)
+            found = certify_sampled(axis.model, assumed[name], gains[name], axis.box)
             if isinstance(found, Failure):
                 return replace(found, reason=f"{name}: {found.reason}")
         return None

@@ -6,6 +6,7 @@ import math
 import os
 import platform
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from typing import Any
@@ -104,7 +105,7 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
     progress.stage("exact check")
     made = provenance(seed, options, spent, begun)
     finished, report = gain_file.prove({**document, "provenance": made})
-    verdicts = tuple(_from_checker(report))
+    verdicts = tuple(from_checker(report))
     accepted = report.status == 0 and not missed
     notes = (compared(problem, gains, tried, found), _rates(problem, gains)) if accepted else ()
     return Design(
@@ -163,7 +164,8 @@ def _refused(problem: Problem, gains: tuple[Gains, ...]) -> Design:
     return Design(document=None, report=None, verdicts=tuple(diagnose(problem, gains)), missed=(), gains=gains)
 
 
-def _from_checker(report: checker.Report) -> list[Verdict]:
+def from_checker(report: checker.Report) -> list[Verdict]:
+    """What the checker did not prove, as verdicts."""
     if report.status == 0:
         return []
     failed = [
@@ -189,13 +191,18 @@ def rejected_document(problem_study: Study, design_: Design) -> dict[str, Any]:
             for k, g in enumerate(design_.gains)
             for kind in KINDS
         ],
-        "obligations": [
-            {"name": v.name, "statement": v.statement, "margin": _finite(v.margin), "unit": v.unit,
-             "verdict": v.verdict, "remedy": v.remedy, "witness": v.witness}
-            for v in design_.verdicts
-        ],
+        "obligations": verdicts_data(design_.verdicts),
         "missed": list(design_.missed),
     }  # fmt: skip
+
+
+def verdicts_data(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """The `obligations` section of a rejected file."""
+    return [
+        {"name": v.name, "statement": v.statement, "margin": _finite(v.margin), "unit": v.unit,
+         "verdict": v.verdict, "remedy": v.remedy, "witness": v.witness}
+        for v in verdicts
+    ]  # fmt: skip
 
 
 def _finite(value: float) -> float | None:

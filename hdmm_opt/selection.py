@@ -17,7 +17,7 @@ from tuning import Best, Budget, Outcome, Population, Selection, best_of, select
 from tuning import search as run_search
 from tuning.decimals import rounded, shortest
 
-from .axis import KINDS
+from .axis import KINDS, Axis
 from .evaluation import evaluate, make_evaluator
 from .problem import Problem
 from .proof import certificate, violation
@@ -181,7 +181,7 @@ def _descended(problem: Problem, start: Array, seed: int, allowed: Budget, compo
 def _shortened(problem: Problem, best: Best, evaluations: int, runs: int, composed: bool) -> Found:
     """The winner with as few digits as its proof and its cost allow."""
     gains = problem.gains(best.point)
-    choices = [_with_digits(problem, gains, digits) for digits in SHORT_DIGITS]
+    choices = [with_digits(problem, gains, digits) for digits in SHORT_DIGITS]
     short = shortest(choices, lambda some: evaluate(problem, some, composed=composed), best.outcome)
     if short is not None:
         gains = short[0]
@@ -189,11 +189,11 @@ def _shortened(problem: Problem, best: Best, evaluations: int, runs: int, compos
     return Found(gains=gains, best=best, evaluations=evaluations + len(choices), runs=runs)
 
 
-def _with_digits(problem: Problem, gains: tuple[Gains, ...], digits: int) -> tuple[Gains, ...]:
+def with_digits(axis: Axis, gains: tuple[Gains, ...], digits: int) -> tuple[Gains, ...]:
     """The gains as shorter decimals inside their ranges; those that the study fixes stay."""
     values = [getattr(g, kind) for g in gains for kind in KINDS]
-    for i in problem.searched:
-        values[i] = rounded(values[i], digits, problem.ranges[i].low, problem.ranges[i].high)
+    for i in axis.searched:
+        values[i] = rounded(values[i], digits, axis.ranges[i].low, axis.ranges[i].high)
     return tuple(Gains(**dict(zip(KINDS, values[k : k + 4], strict=True))) for k in range(0, len(values), 4))
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from stability.observer import SampledObserver
 
 from ..control import RAC
-from ..machine import Machine
+from ..machine import Machine, carried
 from .metrics import Yardstick
 from .system import Record, System, Task
 
@@ -67,7 +67,7 @@ def accelerations(machine: Machine, x: Any, w: Any, p: Any, payload: Any, guess:
     Args:
         machine: The machine.
         x: States of each plant, a list of columns.
-        w: Unused loads are replaced; symbols of each plant stand for them.
+        w: What the inputs add to the second row of each plant; a list.
         p: Parameters of each plant, a list of columns.
         payload: Payload, kg.
         guess: Accelerations to start from. Shape (n,).
@@ -83,7 +83,7 @@ def accelerations(machine: Machine, x: Any, w: Any, p: Any, payload: Any, guess:
     forces = machine.forces(position, speed, a, payload)
     inertia = ca.jacobian(forces, a)
     rest = ca.substitute([forces], [a], [ca.SX.zeros(n)])[0]
-    own = ca.vertcat(*(p[i][list(plant.parameters).index(_carried(plant))] for i, plant in enumerate(machine.plants)))
+    own = ca.vertcat(*(p[i][list(plant.parameters).index(carried(plant))] for i, plant in enumerate(machine.plants)))
     coupling = inertia - ca.diag(own)
     current = ca.SX(guess)
     load = rest + coupling @ current
@@ -101,12 +101,6 @@ def accelerations(machine: Machine, x: Any, w: Any, p: Any, payload: Any, guess:
     return current, load
 
 
-def _carried(plant: Any) -> str:
-    from ..machine import carried
-
-    return carried(plant)
-
-
 def compose_machine(loop: Coupled, joints: Sequence[str]) -> System:
     """The loop as a system for the engine.
 
@@ -121,7 +115,7 @@ def compose_machine(loop: Coupled, joints: Sequence[str]) -> System:
     states, governed, inputs, outer = loop.sizes
     x, z = ca.SX.sym("x", states), ca.SX.sym("z", governed + 2 * inputs + 3 * n + outer)
     shared, t, tau = ca.SX.sym("shared", 5 * n), ca.SX.sym("t"), ca.SX.sym("tau")
-    draws, noise = ca.SX.sym("draws", _channels(loop)), ca.SX.sym("noise", 4)
+    draws, noise = ca.SX.sym("draws", states), ca.SX.sym("noise", 4)
     gains, parameters, payload = ca.SX.sym("gains", 4 * governed), _parameters(machine), ca.SX.sym("payload")
     stuck = sum(3 + len(plant.inputs) for plant in machine.plants)
     fault = ca.SX.sym("fault", stuck)
@@ -172,10 +166,6 @@ def _direct(plant: Any, u: Any, x: Any, p: Any) -> Any:
 
 def _taylor(r: Any, tau: Any) -> Any:
     return r[0] + tau * (r[1] + tau * (r[2] / 2 + tau * (r[3] / 6)))
-
-
-def _channels(loop: Coupled) -> int:
-    return sum(len(plant.states) for plant in loop.machine.plants)
 
 
 def _parameters(machine: Machine) -> list[Any]:

@@ -18,6 +18,7 @@ from stability import Gains
 from trajectories import Reference
 
 from ..control import RAC, gain_columns
+from ..plants import Plant
 from .compose import compose
 from .engine import Batch, Engine
 from .metrics import Metrics, Yardstick, metrics
@@ -101,15 +102,8 @@ class ClosedLoop:
     _made: dict[Any, Any] = field(default_factory=dict, repr=False, init=False)
 
     def substeps(self) -> int:
-        """Integration steps in one period, from the fastest time constant of the plant at nominal parameters."""
-        import casadi as ca
-
-        plant = self.law.plant
-        jacobian = ca.Function("J", [plant.x, plant.u, plant.w, plant.p], [ca.jacobian(plant.rate, plant.x)])
-        values = list(plant.values().values())
-        at_work = np.array(jacobian([0.3, 0.05] + [0.0] * (len(plant.states) - 2), 0, self.nominal_load, values))
-        fastest = float(np.abs(np.linalg.eigvals(at_work)).max())
-        return self.refinement * max(2, math.ceil(self.period * fastest / STEP_SHARE))
+        """Integration steps in one period."""
+        return self.refinement * steps_of(self.law.plant, self.period, self.nominal_load)
 
     def run(
         self, gains: tuple[Gains, ...], reference: Reference, scenario: Scenario, *, duration: float | None = None
@@ -269,7 +263,7 @@ class ClosedLoop:
         z = np.zeros((2 * len(self.law.governed) + 2 * len(plant.inputs), len(runs)))
         return Batch(
             fixed=np.array(columns).T,
-            seeds=np.array([_seed(run.scenario.seed) for run in runs], dtype=np.uint64),
+            seeds=np.array([seed_of(run.scenario.seed) for run in runs], dtype=np.uint64),
             x=self._starts(runs, r[0]),
             z=z,
             shared=r,
@@ -329,6 +323,17 @@ def _extras(run: Run) -> frozenset[str]:
     return frozenset(name for name, needed in wanted.items() if needed)
 
 
-def _seed(seed: int) -> int:
+def steps_of(plant: Plant, period: float, load: float) -> int:
+    """Integration steps in one period, from the fastest time constant of a plant at nominal parameters."""
+    import casadi as ca
+
+    jacobian = ca.Function("J", [plant.x, plant.u, plant.w, plant.p], [ca.jacobian(plant.rate, plant.x)])
+    values = list(plant.values().values())
+    at_work = np.array(jacobian([0.3, 0.05] + [0.0] * (len(plant.states) - 2), 0, load, values))
+    fastest = float(np.abs(np.linalg.eigvals(at_work)).max())
+    return max(2, math.ceil(period * fastest / STEP_SHARE))
+
+
+def seed_of(seed: int) -> int:
     """A seed of the draws: neighbouring numbers give unrelated streams."""
     return int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])

@@ -68,9 +68,14 @@ class Scenario:
 
     def fault_column(self, inputs: int) -> Array:
         """Share, start, rate, and what a stuck actuator delivers. Shape (3 + inputs,)."""
-        fault = self.fault or Fault(share=0.0, start_s=0.0, rate_1_s=0.0)
-        stuck = (*fault.stuck, *[0.0] * (inputs - len(fault.stuck)))
-        return np.array([fault.share, fault.start_s, fault.rate_1_s, *stuck])
+        return fault_column(self.fault, inputs)
+
+
+def fault_column(fault: Fault | None, inputs: int) -> Array:
+    """Share, start, rate, and what a stuck actuator delivers; zeros for none. Shape (3 + inputs,)."""
+    fault = fault or Fault(share=0.0, start_s=0.0, rate_1_s=0.0)
+    stuck = (*fault.stuck, *[0.0] * (inputs - len(fault.stuck)))
+    return np.array([fault.share, fault.start_s, fault.rate_1_s, *stuck])
 
 
 def scenarios(study: Study) -> list[Scenario]:
