@@ -7,7 +7,7 @@ PACKAGES = ("hdmm_opt", "trajectories", "stability", "tuning")
 NEEDED = (
     *(f"{package}/py.typed" for package in PACKAGES),
     "hdmm_opt/studies/emla-p2.toml",
-    "hdmm_opt/schema/gains-1.schema.json",
+    "hdmm_opt/schema/gains-2.schema.json",
     "stability/checker.py",
 )
 

@@ -23,8 +23,10 @@ import numpy as np
 
 from hdmm_opt import study
 from hdmm_opt.problem import assemble
-from hdmm_opt.simulation import Batch, Engine, Record, System, Task, kernel
-from hdmm_opt.simulation.compiler import compiled_text
+from hdmm_opt.simulation import Loop, Run, Scenario
+from hdmm_opt.simulation.engine import Batch, Engine, Record, System, Task, kernel
+from hdmm_opt.simulation.engine.compiler import compiled_text
+from plain import plain
 from timing import fastest
 
 Array = np.ndarray
@@ -41,6 +43,7 @@ class Case:
     record: str
     fixed: Array
     x: Array
+    z: Array
     shared: Array
     own: float
     c_parameters: Array
@@ -48,15 +51,14 @@ class Case:
 
 def emla() -> Case:
     problem = assemble(study.load("emla-p2"))
-    system = problem.loop.system()
-    values = np.array(list(problem.plant.values().values()))
-    reference = np.ascontiguousarray(problem.reference(1e-3 * np.arange(TICKS)).T)
-    by_kind = np.array(GAINS).reshape(2, 4).T.ravel()
-    rest = np.zeros(system.sizes["f"] - by_kind.size - values.size)
+    loop, (member,) = Loop(problem), problem.members
+    heavy = Scenario(name="heavy", disturbances={"load_force": ((0.0, 76e3),)})
+    start = loop.batches.batch([Run(gains={member.name: tuple(GAINS)}, scenario=heavy)], None)
+    values = np.array(list(member.plant.values().values()))
     return Case(
-        name="EMLA at torque level, 3 states, 2 adaptive scalars, 2 tanh", system=system, record="error",
-        fixed=np.concatenate([by_kind, values, rest]), x=np.array([reference[0, 0], 0, 0]), shared=reference, own=76e3,
-        c_parameters=np.concatenate([GAINS, values, [76e3]]),
+        name="EMLA at torque level, 3 states, 2 adaptive scalars, 2 tanh", system=loop.system(), record="error",
+        fixed=start.fixed[:, 0], x=start.x[:, 0], z=start.z[:, 0], shared=np.ascontiguousarray(start.shared[:TICKS]),
+        own=76e3, c_parameters=np.concatenate([GAINS, values, [76e3]]),
     )  # fmt: skip
 
 
@@ -82,7 +84,7 @@ def joint() -> Case:
     fixed = np.array([20.0, 4e6, 9000.0, 2200.0, 300.0, 500.0, 150.0, 0.01, 0.379, 1.156])
     return Case(
         name="lift joint, 2 states, sin, cos, tanh, root", system=system, record="error", fixed=fixed,
-        x=np.array([1.0, 0.0]), shared=reference, own=0.0, c_parameters=fixed,
+        x=np.array([1.0, 0.0]), z=np.zeros(1), shared=reference, own=0.0, c_parameters=fixed,
     )  # fmt: skip
 
 
@@ -90,7 +92,7 @@ def batch(case: Case, runs: int) -> Batch:
     own = np.full((1, TICKS), case.own)
     return Batch(
         fixed=np.repeat(case.fixed[:, None], runs, axis=1), seeds=np.arange(runs, dtype=np.uint64),
-        x=np.repeat(case.x[:, None], runs, axis=1), z=np.zeros((case.system.sizes["z"], runs)), shared=case.shared,
+        x=np.repeat(case.x[:, None], runs, axis=1), z=np.repeat(case.z[:, None], runs, axis=1), shared=case.shared,
         own=lambda run, first, size: own[:, first : first + size],
     )  # fmt: skip
 
@@ -126,7 +128,7 @@ def by_hand(case: Case, folder: Path, function: str, flags: str, lanes: int) -> 
 
 def generated(case: Case, folder: Path, function: str) -> tuple[float, float]:
     """CasADi's own C code for a period, compiled, and called period by period from a C loop."""
-    from hdmm_opt.simulation.virtual import _tick
+    from hdmm_opt.simulation.engine.virtual import _tick
 
     tick = _tick(case.system)
     tick = ca.Function("tick", tick.sx_in(), [tick(*tick.sx_in())[0]])
@@ -151,6 +153,7 @@ def generated(case: Case, folder: Path, function: str) -> tuple[float, float]:
     stacked = np.hstack([ticks[:, None], case.shared, given.own(0, 0, TICKS).T, np.zeros((TICKS, sizes["v"]))]).copy()
     start = np.zeros(cells)
     start[: sizes["x"]] = case.x
+    start[sizes["x"] : sizes["x"] + sizes["z"]] = case.z
     start[sizes["x"] + sizes["z"]] = np.inf
     state = start.copy()
     pointer = ctypes.POINTER(ctypes.c_double)
@@ -164,27 +167,32 @@ def generated(case: Case, folder: Path, function: str) -> tuple[float, float]:
 
 
 def period_by_period(case: Case, ticks: int, advance: Callable[[Array, Array, int], Array]) -> tuple[float, float]:
-    """A Python loop over the periods: the law as a CasADi function, the plant by another program."""
+    """A Python loop over the periods: the law in plain Python, the plant by another program."""
     system = case.system
-    groups = [system.x, system.z, system.shared, system.own, system.fixed, system.t]
+    after = system.tasks[0].after
     if system.draws.numel():
-        after = ca.substitute([system.tasks[0].after], [system.draws], [ca.SX.zeros(system.draws.numel())])[0]
-    else:
-        after = system.tasks[0].after
-    law = ca.Function("law", groups, [after])
-    x, z, most = case.x.copy(), np.zeros(system.sizes["z"]), 0.0
+        after = ca.substitute([after], [system.draws], [ca.SX.zeros(system.draws.numel())])[0]
+    law, constant = plain(_groups(system), after), [case.own, *case.fixed.tolist()]
+    x, z, most = case.x.copy(), case.z.copy(), 0.0
     begun = time.perf_counter()
     for k in range(ticks):
         most = max(most, abs(x[0] - case.shared[k, 0]))
-        z = np.array(law(x, z, case.shared[k], case.own, case.fixed, k * system.period)).ravel()
+        z = np.array(law([*x.tolist(), *z.tolist(), *case.shared[k].tolist(), *constant, k * system.period]))
         x = advance(x, z, k)
     return ticks / (time.perf_counter() - begun), most
 
 
-def rate_of(case: Case) -> Callable[[Array, Array, int], Array]:
-    s = case.system
-    rate = ca.Function("rate", [s.x, s.z, s.shared, s.own, s.fixed, s.t], [s.rate])
-    return lambda x, z, k: np.array(rate(x, z, case.shared[k], case.own, case.fixed, k * s.period)).ravel()
+def rate_of(case: Case) -> Callable[[Array, Array, int], list[float]]:
+    rate, constant = plain(_groups(case.system), case.system.rate), [case.own, *case.fixed.tolist()]
+
+    def at(x: Array, z: Array, k: int) -> list[float]:
+        return rate([*x.tolist(), *z.tolist(), *case.shared[k].tolist(), *constant, k * case.system.period])
+
+    return at
+
+
+def _groups(system: System) -> list[ca.SX]:
+    return [system.x, system.z, system.shared, system.own, system.fixed, system.t]
 
 
 def scipy_periods(case: Case, ticks: int) -> tuple[float, float]:
@@ -313,7 +321,7 @@ def growth() -> None:
     for blocks in (1, 2, 4, 8, 16):
         system = chain(blocks)
         case = Case(
-            name="", system=system, record="error", fixed=np.ones(1), x=np.zeros(2 * blocks), own=0.0,
+            name="", system=system, record="error", fixed=np.ones(1), x=np.zeros(2 * blocks), z=np.zeros(blocks), own=0.0,
             shared=np.ones((TICKS, 1)), c_parameters=np.zeros(0),
         )  # fmt: skip
         os.environ[kernel.CACHE_VARIABLE] = ""

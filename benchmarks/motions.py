@@ -20,9 +20,9 @@ import casadi as ca
 import numpy as np
 from scipy.interpolate import BSpline
 
-from hdmm_opt.enclosure import enclosure
-from hdmm_opt.plants.rigid_body import inverse_dynamics
-from hdmm_opt.plants.urdf import bodies
+from hdmm_opt.motions.enclosure import enclosure
+from hdmm_opt.machines.rigid_body import inverse_dynamics
+from hdmm_opt.machines.urdf import bodies
 from trajectories import MotionLimits, Quantities, Task, Waypoint, solve
 from trajectories.guess import straight
 from trajectories.nodes import collocation_points

@@ -2,7 +2,7 @@
 
 Every method has the same first population for a seed, the same scenarios with the same noise, and the same feasibility
 rules. An evaluation is one candidate; a gradient costs as many more as there are searched gains. "from nothing" leaves
-out the convex start; "from the start" is what `hdmm-opt design` does.
+out the bandwidth cascades; "from the start" is what `hdmm-opt design` does.
 """
 
 from __future__ import annotations
@@ -15,22 +15,25 @@ import numpy as np
 from scipy.stats import mannwhitneyu
 
 from hdmm_opt import study
-from hdmm_opt.evaluation import make_evaluator
-from hdmm_opt.gradient import descent
-from hdmm_opt.problem import Problem, assemble
-from hdmm_opt.selection import starting_point
+from hdmm_opt.design.evaluation import make_evaluator
+from hdmm_opt.design.gradient import descent
+from hdmm_opt.design.options import Progress
+from hdmm_opt.design.space import Window
+from hdmm_opt.design.start import starting_point
+from hdmm_opt.problem import assemble
+from hdmm_opt.simulation import Loop
 from tuning import Budget, best_of, search
 
 POPULATION = 20
 
 
-def costs(problem: Problem, evaluate, first: np.ndarray, method: str, evaluations: int, seed: int) -> float:
+def costs(loop: Loop, evaluate, first: np.ndarray, method: str, evaluations: int, seed: int) -> float:
     if method != "gradient":
         found = best_of(search(method, evaluate, first, POPULATION, seed, Budget(evaluations=evaluations)))
         return math.inf if found is None else found.outcome.cost
     random = np.random.default_rng(seed)
     starts = [first, *random.uniform(size=(50, first.size))]
-    tried, _ = descent(problem, starts, Budget(evaluations=evaluations - 1))
+    tried, _ = descent(loop, starts, Budget(evaluations=evaluations - 1))
     return evaluate([tried[0]])[0].cost if tried else math.inf
 
 
@@ -39,8 +42,10 @@ def main() -> None:
     evaluations = int(sys.argv[2]) if len(sys.argv) > 2 else 400
     seeds = range(int(sys.argv[3]) if len(sys.argv) > 3 else 12)
     chosen = study.load(name)
-    problem, evaluate = assemble(chosen), make_evaluator(chosen)
-    convex = problem.point(starting_point(problem).gains)
+    problem = assemble(chosen)
+    everywhere = Window(low=np.zeros(problem.searched), high=np.ones(problem.searched))
+    loop, evaluate = Loop(problem), make_evaluator(chosen, everywhere)
+    cascade = problem.point(starting_point(problem, Progress()).gains)
     print(f"{name}: {evaluations} evaluations, {len(seeds)} seeds; cost, smaller is better")
     for title in ("from nothing", "from the start"):
         print(title)
@@ -49,10 +54,9 @@ def main() -> None:
             begun = time.perf_counter()
             found = []
             for seed in seeds:
-                first = (
-                    convex if title != "from nothing" else np.random.default_rng([seed, 7]).uniform(size=convex.size)
-                )
-                found.append(costs(problem, evaluate, first, method, evaluations, seed))
+                nothing = np.random.default_rng([seed, 7]).uniform(size=cascade.size)
+                first = nothing if title == "from nothing" else cascade
+                found.append(costs(loop, evaluate, first, method, evaluations, seed))
             table[method] = np.array(found)
             seconds = (time.perf_counter() - begun) / len(seeds)
             low, middle, high = np.quantile(found, (0.25, 0.5, 0.75), method="nearest")

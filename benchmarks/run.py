@@ -9,20 +9,23 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from hdmm_opt import gain_file, study
-from hdmm_opt.gain_file import gains_of
-from hdmm_opt.problem import Problem, assemble, study_of
-from hdmm_opt.proof import certificate, composition
-from hdmm_opt.simulation import Scenario
-from stability import Gains, certify, certify_sampled, checker
-from stability.network import Coupling, Subsystem, compose, exchange
-from stability.quadratic import Inclusion, prove, search
+from hdmm_opt import study
+from hdmm_opt.design.certify import certificate, composition
+from hdmm_opt.files.read import read
+from hdmm_opt.files.restore import restored
+from hdmm_opt.problem import GainSet, Problem, assemble
+from hdmm_opt.simulation import Loop, Run, Scenario
+from stability import Certificate, Gains, certify, certify_sampled, checker
+from stability.certificates.quadratic import Inclusion, prove, search
+from stability.networks.contracts import Assume, Subsystem, replaced, solve_contracts
+from stability.networks.springs import Coupling, coupled
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from known_answers import chain_bounds, claim_of, integrator_chain
+from plain import plain
 from timing import fastest
 
-GAINS = (Gains(beta=24.0), Gains(beta=6000.0))
+VALUES = (24.0, 0.0, 1.0, 1.0, 6000.0, 0.0, 1.0, 1.0)
 FILES = Path(__file__).parents[1] / "notebooks" / "gains"
 
 
@@ -35,42 +38,40 @@ def chain(order: int) -> Callable[[], object]:
 
 
 def scipy_loop(problem: Problem, seconds: float) -> Callable[[], object]:
-    """The same sampled loop, period by period, with SciPy's adaptive integrator."""
+    """The same sampled loop, period by period, with SciPy's adaptive integrator on a plain rate function."""
     import casadi as ca
 
-    plant, law = problem.plant, problem.law
-    rate = ca.Function("f", [plant.x, plant.u, plant.w, plant.p], [plant.rate])
-    step = law.step_function(problem.bounds.period)
+    (member,) = problem.members
+    plant, law, period = member.plant, member.law, member.bounds.period
+    rate = plain([plant.x, plant.u, plant.w, plant.p], plant.rate)
+    x, r, z = ca.SX.sym("x", len(plant.states)), ca.SX.sym("r", 4), ca.SX.sym("z", law.states)
     nominal = list(plant.values().values())
-    gains = np.array([[g.beta, g.epsilon, g.delta, g.sigma] for g in GAINS])
+    step = plain([x, r, z], ca.vertcat(*law.step(x, r, z, ca.DM(VALUES), ca.DM(nominal), ca.DM([70e3]), period)[:2]))
+    reference = member.reference(period * np.arange(round(seconds / period))).T.tolist()
 
-    def right(_: float, x: np.ndarray, u: float) -> np.ndarray:
-        return np.array(rate(x, u, 76e3, nominal)).ravel()
+    def right(_: float, x: np.ndarray, u: float) -> list[float]:
+        return rate([*x.tolist(), u, 76e3, *nominal])
 
     def run() -> None:
-        x, theta = np.array([0.1, 0.0, 0.0]), np.zeros(2)
-        for k in range(round(seconds / problem.bounds.period)):
-            r = problem.reference(k * problem.bounds.period)[:, 0]
-            u, following, _ = step(x, r, theta, gains, nominal, 70e3)
-            theta = np.array(following).ravel()
-            x = solve_ivp(right, (0, problem.bounds.period), x, args=(float(u),), rtol=1e-8, atol=1e-10).y[:, -1]
+        x, theta = np.array([0.1, 0.0, 0.0]), [0.0, 0.0]
+        for r in reference:
+            u, *theta = step([*x.tolist(), *r, *theta])
+            x = solve_ivp(right, (0, period), x, args=(u,), rtol=1e-8, atol=1e-10).y[:, -1]
 
     return run
 
 
-def network(count: int) -> tuple[dict[str, Subsystem], list[Coupling]]:
+def network(count: int) -> tuple[dict[str, Subsystem], Assume]:
     """A chain of two-row loops that push their neighbours."""
-    own = Subsystem(
-        model=integrator_chain(2), bounds=chain_bounds(2, period=1e-3, disturbance=0.4),
-        gains=(Gains(beta=30.0), Gains(beta=200.0)), limit=np.array([0.05, 1.0]),
-    )  # fmt: skip
+    own = Subsystem(model=integrator_chain(2), gains=(Gains(beta=30.0), Gains(beta=200.0)), limit=np.array([0.05, 1.0]))
     couplings = [
         Coupling(source=str(j), target=str(i), disturbance="w", gain=250.0)
         for i in range(count)
         for j in (i - 1, i + 1)
         if 0 <= j < count
     ]
-    return {str(i): own for i in range(count)}, couplings
+    alone = dict.fromkeys(map(str, range(count)), chain_bounds(2, period=1e-3, disturbance=0.4))
+    return {str(i): own for i in range(count)}, coupled(alone, couplings)
 
 
 def random_inclusion(states: int, uncertain: int) -> Inclusion:
@@ -90,11 +91,13 @@ def show(title: str, rows: list[tuple[str, float]]) -> None:
 
 def modular() -> None:
     """Composition of subsystems, and the exchange of one."""
-    rows = [(f"compose {n} subsystems", fastest(lambda n=n: compose(*network(n)), 3)) for n in (4, 10, 20, 40)]
-    subsystems, couplings = network(40)
-    contracts = compose(subsystems, couplings)
+    rows = [
+        (f"contracts of {n} subsystems", fastest(lambda n=n: solve_contracts(*network(n)), 3)) for n in (4, 10, 20, 40)
+    ]
+    subsystems, assume = network(40)
+    contracts = solve_contracts(subsystems, assume)
     assert isinstance(contracts, dict)
-    rows.append(("exchange one of 40", fastest(lambda: exchange(contracts, couplings, "17", subsystems["17"]))))
+    rows.append(("exchange one of 40", fastest(lambda: replaced(contracts, assume, "17", subsystems["17"]))))
     contract, own = contracts["17"], subsystems["17"]
     claim = claim_of(own.model, contract.bounds, own.gains, contract.certificate)
     rows.append(("exact check of one contract", fastest(lambda: checker.obligations(claim))))
@@ -119,32 +122,43 @@ def studies() -> None:
     """Certificates and exact checks of the bundled studies, beside their bounds."""
     rows = []
     for path in sorted(FILES.glob("*.gains.json")):
-        text, document = path.read_text(encoding="utf-8"), gain_file.read(path)
-        problem, gains = assemble(study_of(document["study"]), gain_file.reference_of(document)), gains_of(document)
-        arguments = (problem.model, problem.bounds, gains, problem.box)
-        name = path.name.removesuffix(".gains.json")
-        plain, refined = certify_sampled(*arguments), certify_sampled(*arguments, refine=True)
-        other = composition(problem, problem.bounds, gains)
-        bounds = [f"{1e3 * float(c.ball[0]):.4g} mm" if hasattr(c, "ball") else "none" for c in (plain, refined, other)]
-        rows += [
-            (f"{name}: sampled ({bounds[0]})", fastest(lambda a=arguments: certify_sampled(*a))),
-            (
-                f"{name}: sampled, refined ({bounds[1]})",
-                fastest(lambda a=arguments: certify_sampled(*a, refine=True), 1),
-            ),
-            (
-                f"{name}: composition ({bounds[2]})",
-                fastest(lambda p=problem, g=gains: composition(p, p.bounds, g), 1),
-            ),
-            (f"{name}: exact check of the file", fastest(lambda t=text: checker.check_text(t), 1)),
-        ]
+        text, name = path.read_text(encoding="utf-8"), path.name.removesuffix(".gains.json")
+        problem, gains = restored(read(path))
+        if problem.linked:
+            subsystems = problem.subsystems(gains)
+            rows.append(
+                (f"{name}: contracts", fastest(lambda p=problem, s=subsystems: solve_contracts(s, p.assume), 1))
+            )
+        else:
+            rows += alone(name, problem, gains)
+        rows.append((f"{name}: exact check of the file", fastest(lambda t=text: checker.check_text(t), 1)))
     show("studies", rows)
+
+
+def alone(name: str, problem: Problem, gains: GainSet) -> list[tuple[str, float]]:
+    """Certificates of one actuator beside their bounds."""
+    (member,) = problem.members
+    values = gains[member.name]
+    arguments = (member.model, member.bounds, member.gains(values), member.box)
+    makers: list[tuple[str, Callable[[], object]]] = [
+        ("sampled", lambda: certify_sampled(*arguments)),
+        ("sampled, refined", lambda: certify_sampled(*arguments, refine=True)),
+        ("composition", lambda: composition(member, values)),
+    ]
+    rows = []
+    for title, make in makers:
+        found = make()
+        bound = f"{1e3 * float(found.ultimate[0]):.4g} mm" if isinstance(found, Certificate) else "none"
+        rows.append((f"{name}: {title} ({bound})", fastest(make, 1)))
+    return rows
 
 
 def main() -> None:
     """Print the tables."""
     problem = assemble(study.load("emla-p2"))
-    heavy = Scenario(name="heavy", load=((0.0, 76e3),))
+    loop, (member,) = Loop(problem), problem.members
+    heavy = Scenario(name="heavy", disturbances={"load_force": ((0.0, 76e3),)})
+    run = Run(gains={member.name: VALUES}, scenario=heavy)
     show(
         "chains of integrators",
         [
@@ -158,9 +172,9 @@ def main() -> None:
     show(
         "closed loop, 0.5 s of emla-p2",
         [
-            ("compiled", fastest(lambda: problem.loop.run(GAINS, problem.reference, heavy, duration=0.5))),
-            ("SciPy period by period", fastest(scipy_loop(problem, 0.5), 1)),
-            ("certificate at these gains", fastest(lambda: certificate(problem, GAINS))),
+            ("compiled", fastest(lambda: loop.figures([run], duration=0.5))),
+            ("SciPy period by period, plain rate function", fastest(scipy_loop(problem, 0.5), 1)),
+            ("certificate at these gains", fastest(lambda: certificate(member, VALUES))),
         ],
     )
 

@@ -1,9 +1,25 @@
-"""What goes wrong, by who can mend it."""
+"""What goes wrong, and what it says to whom."""
+
+from __future__ import annotations
 
 
 class InvalidInputError(Exception):
-    """Bad input: one line with the rule, what came, and what would do. Exit status 2."""
+    """Bad input: one line with the rule, what came, and what would do."""
+
+
+class RefusedKeyError(InvalidInputError):
+    """A key of a study that does not fit.
+
+    Args:
+        key: Its place, with dots, from the section on that is judged.
+        rule: What holds, and what came.
+        remedy: What would do.
+    """
+
+    def __init__(self, key: str, rule: str, remedy: str) -> None:
+        super().__init__(f"{key} {rule}; {remedy}")
+        self.key, self.rule, self.remedy = key, rule, remedy
 
 
 class DefectError(Exception):
-    """A simulation left its certified envelope: the toolkit is wrong, and must say so and stop. Exit status 1."""
+    """A simulation contradicts a proof: a defect of this toolkit, not of the input."""

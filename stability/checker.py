@@ -2,11 +2,98 @@
 
 A second program. It imports nothing but Python's standard library and trusts no number that the producer derived: from
 the assumptions, the gains and the model in the file it encloses the closed loop in rational interval arithmetic with
-outward rounding, builds every inequality itself, and decides each exactly: matrix inequalities by rational LDLᵀ, the
-comparison system of a sampled loop by rational linear algebra. What it takes as given is the statement: the plant and
-the law as operation lists, the assumptions, the study.
+outward rounding, builds every inequality itself, and decides each exactly. What it takes as given is the statement: the
+plant and the law as operation lists, the assumptions, the study.
 
 Exit status: 0 everything proved, 1 something is not, 2 a file that cannot be read.
+
+Assembled from the parts in stability/checking, in this order:
+
+limits: What a gain file must prove, and how large it may be.
+
+  Must fail: an obligation left out, another law or kind of certificate, a file beyond these sizes.
+
+arithmetic: Intervals of fractions, rounded outwards to a number of bits.
+
+  Theorem: the fundamental theorem of interval arithmetic (Moore 1966); every operation holds the range of what it
+  encloses.
+
+forms: Linear forms with interval coefficients: what plant and law share cancels.
+
+  Theorem: affine forms with a symbol for each nonlinear value (Stolfi and de Figueiredo 1997); derivatives by the
+  chain rule. Must fail: an operation list that reads what is not there, a sign or a term of it changed.
+
+fixed: Intervals on a fixed grid, rounded outwards: ranges and derivatives of large operation lists.
+
+  Theorem: as `arithmetic`; the same enclosures on whole numbers, an order of magnitude faster.
+
+parsing: Numbers, hashes and operation lists of a file, refused where they are malformed.
+
+  Must fail: numbers in other forms, doubled keys, changed content, unknown operators, indices that come later.
+
+claim: The statement about one member as data.
+
+reference: Bounds of a reference for all t from its control points.
+
+  Theorem: a spline lies in the hull of its control points (de Boor 1978). Must fail: jumps, a moving end, other
+  bounds.
+
+reading: Reads what a file says of a member, and refuses what is not the study's.
+
+  Must fail: an assumption narrower than the study, a gain outside its range, a law that reads what it cannot know, a
+  plant that does not feel what the study states.
+
+loop: The closed loop in error coordinates: M_i Q_i' = sum S_ij Q_j + d_i over the assumed box.
+
+  Obligations: composition, sampling, adaptation. Must fail: a sign of plant or law, a smaller box, more noise.
+
+deviation: The closed loop around the moving operating point, with the input as it is held.
+
+matrices: Matrices of fractions, and the exponential of one in fixed point with a bound on its error.
+
+period: The map over a control period and the positive system that bounds it.
+
+  Theorem: |y(t + T)| <= A |y| + b at every vertex of the inertias, by comparison (docs/proof.md). Must fail: other
+  coordinates, fewer cells, a cell of another range.
+
+obligation: One verdict, and the verdicts on a file.
+
+composition: The composition certificate: a Lyapunov function of all subsystems.
+
+  Theorem: V = sum w_i M_i Q_i^2 / 2 decays to a level (theory of docs/proof.md); the matrix condition by exact LDL^T
+  at every sign vertex (Rohn 1994). Obligations: composition, invariance, sampling, accuracy. Must fail: smaller
+  weights, a faster decay, theta in V where it does not adapt.
+
+sampled: The sampled certificate: a comparison system on the exact zero-order-hold map.
+
+  Theorem: A R + b <= R is never left, A s <= (1 - mu T) s tells how fast R is reached (Bellman 1962; Siljak 1978).
+  Obligations: contraction, invariance, sampling, accuracy. Must fail: smaller reach, start or shape, a faster decay.
+
+obligations: All obligations of a member, decided.
+
+  Obligations: non-vacuity, reference, authority, adaptation, rounding, accuracy, and those of the certificate's kind.
+  Must fail: lower limits, a shorter stroke, a tighter requirement, a faster adaptation than the rate allows.
+
+golden: Golden vectors follow from the gains and the law, to float accuracy.
+
+member: A member of a machine: read, decided, and compared with what the file records.
+
+motion: The motion of all members over slices of time.
+
+  Theorem: Bezier points by blossoms hold a spline's piece (Ramshaw 1989). Obligation: motion. Must fail: knots that
+  differ.
+
+coupling: What members do to each other.
+
+  Theorem: mean value theorem over slices and first exit from the guarantees; the accelerations by contraction
+  (Banach; docs/machine.md). Obligations: guarantees, loads, coupling, output. Must fail: a heavier load, a smaller
+  guarantee, a narrower assumption on a load, a smaller bound on the output.
+
+observer: A sampled motion-state observer, bounded by a comparison system of two rows.
+
+  Obligation: observer. Must fail: a slower observer, a worse encoder, another pole.
+
+command: The command: files in, verdicts out.
 """
 
 from __future__ import annotations
@@ -18,31 +105,37 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
-SCHEMA = "hdmm-opt/gains/1"
-_COMMON = ("invariance", "authority", "sampling", "adaptation", "rounding", "accuracy")
-#: What must be proved for each law and kind of certificate; a file that leaves one out is refused.
+# --- limits ---
+
+#: What must be proved of every member whatever its law.
+COMMON = ("non-vacuity", "reference", "invariance", "authority", "sampling", "adaptation", "rounding", "accuracy")
+SCHEMA = "hdmm-opt/gains/2"
+#: What must be proved of each member for its law and its kind of certificate; a file that leaves one out is refused.
 REQUIRED = {
     "rac": {
-        "composition": ("non-vacuity", "reference", "composition", *_COMMON),
-        "sampled": ("non-vacuity", "reference", "contraction", *_COMMON),
-        "network": ("joints", "motion", "promises", "loads", "coupling", "observer", "tool"),
+        "composition": ("composition", *COMMON),
+        "sampled": ("contraction", *COMMON),
     }
 }
+#: What must be proved beside it where members push each other, and where an observer stands for a measured speed.
+COUPLED, OBSERVED = ("guarantees", "motion", "loads", "coupling", "output"), ("guarantees", "observer")
+#: Vectors of each kind of certificate.
+VECTORS = {"composition": ("weights", "young", "leak"), "sampled": ("reach", "start", "shape")}
 MAX_BYTES, MAX_DIGITS, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 20_000_000, 300, 12_000, 8, 5_000
 #: Cells of a sampled certificate, digits of its numbers, and (vertices + 8) n³ summed over its cells.
 MAX_CELLS, MAX_CELL_DIGITS, MAX_VERTICES = 64, 60, 40_000
-#: Interval products that one axis and the coupling of a machine may take; a file of ours takes a tenth of it.
+#: Interval products that one member and the coupling of a machine may take; a file of ours takes a tenth of it.
 MAX_PRODUCTS, MAX_COUPLED = 100_000, 20_000_000
-#: Joints of a machine, and slices of time that its motion may be cut into.
-MAX_JOINTS, MAX_SLICES = 8, 4_000
-#: Names of the parameter that holds a joint's own part of the bodies' inertia.
-OWN = ("load_mass", "load_inertia")
+#: Members of a machine, and slices of time that its motion may be cut into.
+MAX_MEMBERS, MAX_SLICES = 8, 4_000
+#: Names of the parameter that holds a member's own part of the bodies' inertia.
+CARRIED = ("load_mass", "load_inertia")
 #: Parts of the ranges of speed and load in which the answer of an acceleration to a load is bounded.
 SPEED_PARTS, LOAD_PARTS = 48, 4
 #: Relative width given to every gain, so that the proof holds for its decimal, its float64 and its float32.
@@ -50,6 +143,8 @@ ROUNDING = Fraction(1, 2**23)
 BITS, MAX_SHIFT = 96, 3_000
 #: Fixed-point bits of matrix exponentials, terms of their series, largest norm, and a bound on all their errors.
 FIXED, TERMS, MAX_NORM, FIXED_ERROR = 192, 120, 20, Fraction(1, 2**100)
+#: Fractional bits of the fixed-point intervals of a coupling, and bits beyond which nothing is proved.
+SCALE, MAX_FIXED = 160, 4_000
 NAME, NUMBER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}"), re.compile(r"-?[0-9]+(/[0-9]+|(\.[0-9]+)?([eE][+-]?[0-9]+)?)")
 
 
@@ -67,7 +162,7 @@ def need(condition: bool, message: str) -> None:
         raise UnreadableError(message)
 
 
-# --- intervals: pairs (low, high) of Fractions, rounded outwards to BITS significant bits -------------------------
+# --- arithmetic ---
 
 Interval = tuple[Fraction, Fraction]
 ZERO: Interval = (Fraction(0), Fraction(0))
@@ -110,14 +205,26 @@ def neg(a: Interval) -> Interval:
 class Work:
     """Counts interval products, so that no file can keep the checker busy for long."""
 
-    products, allowed = 0, MAX_PRODUCTS
+    def __init__(self) -> None:
+        self.left = 0
+
+    def begin(self, allowed: int) -> None:
+        """Allow so many products from here on."""
+        self.left = allowed
+
+    def one(self) -> None:
+        """Count a product."""
+        self.left -= 1
+        if self.left < 0:
+            raise NotProvedError("the model is larger than this checker takes on")
+
+
+WORK = Work()
 
 
 def mul(a: Interval, b: Interval) -> Interval:
     """Product."""
-    Work.products += 1
-    if Work.products > Work.allowed:
-        raise NotProvedError("the model is larger than this checker takes on")
+    WORK.one()
     if a[0] == a[1] == 0 or b[0] == b[1] == 0:
         return ZERO
     ends = (a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1])
@@ -180,56 +287,17 @@ def tanh(a: Interval) -> Interval:
     return tanh_point(a[0])[0], tanh_point(a[1])[1]
 
 
-def turn(x: Fraction) -> tuple[Interval, Interval]:
-    """Enclosures of the sine and the cosine of one number, by Taylor sums on |x| <= 1/2 and doubling of the angle."""
-    if abs(x) > 100:
-        raise NotProvedError("an angle of the machine is beyond 100 rad")
-    doublings = 0
-    while abs(x) > Fraction(1, 2):
-        x, doublings = x / 2, doublings + 1
-    term, sums = Fraction(1), [Fraction(1), Fraction(0)]
-    for k in range(1, 28):
-        term = down(term * x / k)
-        sums[k % 2] += -term if k % 4 > 1 else term
-    room = Fraction(1, 2 ** (BITS - 8))
-    cosine, sine = ((down(v - room), up(v + room)) for v in sums)
-    two = (Fraction(2), Fraction(2))
-    for _ in range(doublings):
-        sine, cosine = mul(two, mul(sine, cosine)), add(ONE, neg(mul(two, square(sine))))
-    return sine, cosine
-
-
-def turned(a: Interval) -> tuple[Interval, Interval]:
-    """Ranges of sine and cosine.
-
-    By value and slope at the middle with a curvature of at most 1; where the other one keeps its sign, by the ends.
-    """
-    middle = down((a[0] + a[1]) / 2)
-    radius = max(a[1] - middle, middle - a[0])
-    sine, cosine = turn(middle)
-    way, bend = symmetric(radius), symmetric(radius * radius / 2)
-    unit = symmetric(Fraction(1))
-    sines = meet(unit, add(add(sine, mul(cosine, way)), bend))
-    cosines = meet(unit, add(add(cosine, mul(neg(sine), way)), bend))
-    (first, last), keeps = (turn(a[0]), turn(a[1])), lambda b: not b[0] <= 0 <= b[1]
-    if keeps(cosines):
-        sines = meet(sines, (min(first[0][0], last[0][0]), max(first[0][1], last[0][1])))
-    if keeps(sines):
-        cosines = meet(cosines, (min(first[1][0], last[1][0]), max(first[1][1], last[1][1])))
-    return sines, cosines
-
-
 def magnitude(a: Interval) -> Fraction:
     """Largest absolute value."""
     return max(abs(a[0]), abs(a[1]))
 
 
-def meet(a: Interval, b: Interval) -> Interval:
+def intersect(a: Interval, b: Interval) -> Interval:
     """Intersection of two enclosures of the same quantity."""
     return max(a[0], b[0]), min(a[1], b[1])
 
 
-# --- linear forms: {symbol: coefficient interval}, the constant under "" ------------------------------------------
+# --- forms ---
 
 Form = dict[str, Interval]
 
@@ -279,7 +347,7 @@ class Table:
 
     def node(self, key: int, form: Form, natural: Interval) -> Node:
         """A value whose range is the better of two enclosures."""
-        return Node(key, form, meet(natural, self.over(form)))
+        return Node(key, form, intersect(natural, self.over(form)))
 
     def fresh(self, key: int, definition: Form, natural: Interval) -> Node:
         """A nonlinear value: a symbol of its own, the same for the same operation."""
@@ -352,13 +420,6 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
 
 def derivative(program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[str, Form]) -> Form:
     """Directional derivative of the first output, enclosed over the ranges of the inputs."""
-    return derivatives(program, ranges, tangents)[0][1]
-
-
-def derivatives(
-    program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[str, Form]
-) -> list[tuple[Interval, Form]]:
-    """Range and directional derivative of every output, enclosed over the ranges of the inputs."""
     two = (Fraction(2), Fraction(2))
 
     def apply(operator: str, a: tuple[Interval, Form], b: tuple[Interval, Form] | None = None) -> Any:
@@ -372,9 +433,6 @@ def derivatives(
         if operator == "sqrt":
             value = root(x[0], False), root(x[1], True)
             return value, times(dx, inverse(mul(two, value)))
-        if operator in ("sin", "cos"):
-            sine, cosine = turned(x)
-            return (sine, times(dx, cosine)) if operator == "sin" else (cosine, times(dx, neg(sine)))
         if operator == "sq":
             return square(x), times(dx, mul(two, x))
         if operator == "add":
@@ -387,91 +445,197 @@ def derivatives(
         return ratio, times(plus(dx, times(dy, neg(ratio))), inverse(y))
 
     entries = walk(program, lambda n: (ranges[n], tangents.get(n, {})), lambda c: ((c, c), {}), apply)
-    return [entries[index] for index in program["outputs"]]
+    return entries[program["outputs"][0]][1]
 
 
-#: Vectors of each kind of certificate.
-VECTORS = {"composition": ("weights", "young", "leak"), "sampled": ("reach", "start", "shape")}
+# --- fixed ---
+
+Fixed = tuple[int, int]
+#: A value and its derivatives by the name of the direction.
+Slope = tuple[Fixed, dict[str, Fixed]]
+UNIT: Fixed = (1 << SCALE, 1 << SCALE)
+NONE: Fixed = (0, 0)
 
 
-# --- the statement in the file ------------------------------------------------------------------------------------
+def to_fixed(a: Interval) -> Fixed:
+    """An interval of fractions, rounded outwards."""
+    return (a[0].numerator << SCALE) // a[0].denominator, -((-a[1].numerator << SCALE) // a[1].denominator)
 
 
-@dataclass(frozen=True)
-class Gain:
-    """Gains of one governed row, as intervals."""
-
-    beta: Interval
-    epsilon: Interval
-    delta: Interval
-    sigma: Interval
+def from_fixed(a: Fixed) -> Interval:
+    """The same interval in fractions."""
+    return Fraction(a[0], 1 << SCALE), Fraction(a[1], 1 << SCALE)
 
 
-@dataclass(frozen=True)
-class Cell:
-    """W, R, P and s of a sampled certificate for a part of the inertias' ranges."""
+def fixed_product(a: Fixed, b: Fixed) -> Fixed:
+    """Product, rounded outwards."""
+    WORK.one()
+    (p, q), (r, s) = a, b
+    if p >= 0:
+        low, high = (p * r if r >= 0 else q * r), (q * s if s >= 0 else p * s)
+    elif q <= 0:
+        low, high = (p * s if s >= 0 else q * s), (q * r if r >= 0 else p * r)
+    elif r >= 0:
+        low, high = p * s, q * s
+    elif s <= 0:
+        low, high = q * r, p * r
+    else:
+        low, high = min(p * s, q * r), max(p * r, q * s)
+    if max(low.bit_length(), high.bit_length()) > MAX_FIXED:
+        raise NotProvedError("a bound leaves the range of numbers that the checker handles")
+    return low >> SCALE, -(-high >> SCALE)
 
-    transform: list[list[Fraction]]
-    reach: list[Fraction]
-    start: list[Fraction]
-    shape: list[Fraction]
+
+def fixed_inverse(a: Fixed) -> Fixed:
+    """Reciprocal."""
+    if a[0] <= 0 <= a[1]:
+        raise NotProvedError("a divisor can vanish in the assumed box")
+    one = 1 << 2 * SCALE
+    return one // a[1], -(-one // a[0])
 
 
-@dataclass(frozen=True)
-class Claim:
-    """Everything that the checker reads from a file."""
+def fixed_square(a: Fixed) -> Fixed:
+    """Range of x²."""
+    low, high = sorted((abs(a[0]), abs(a[1])))
+    return fixed_product((0 if a[0] <= 0 <= a[1] else low, high), (0 if a[0] <= 0 <= a[1] else low, high))
 
-    rows: list[dict[str, Any]]
-    drives: list[int]
-    inputs: list[str]
-    plant: dict[str, Any]
-    law: list[dict[str, Any]]
-    parameters: dict[str, Interval]
-    disturbances: dict[str, Interval]
-    nominal: dict[str, Fraction]
-    reference: list[Interval]
-    noise: list[Fraction]
-    initial: list[Fraction]
-    period: Fraction
-    gains: list[tuple[Fraction, ...]]
-    kind: str
-    decay: Fraction
-    vectors: dict[str, list[Fraction]]
-    split: list[int]
-    cells: list[Cell]
-    radii: list[Fraction]
-    held: list[Fraction]
-    ball: list[Fraction]
-    limits: list[dict[str, Any]]
-    stroke: Interval
-    accuracy: Fraction
-    transient: Fraction
-    feedforward: dict[str, tuple[Interval, Interval]] = field(default_factory=dict)
 
-    @property
-    def governed(self) -> list[int]:
-        """Indices of the rows with gains."""
-        return [i for i, row in enumerate(self.rows) if row["governed"]]
+def fixed_root(a: Fixed) -> Fixed:
+    """Range of the square root."""
+    if a[0] < 0:
+        raise NotProvedError("a square root of a negative number in the assumed box")
+    return math.isqrt(a[0] << SCALE), math.isqrt(a[1] << SCALE) + 1
 
-    @property
-    def weights(self) -> list[Fraction]:
-        """Weights w of a composition."""
-        return self.vectors["weights"]
 
-    @property
-    def young(self) -> list[Fraction]:
-        """Young's ν of a composition."""
-        return self.vectors["young"]
+def fixed_turn(x: int) -> tuple[Fixed, Fixed]:
+    """Enclosures of the sine and the cosine of one number: Taylor sums on |x| <= 1/2, doubling of the angle.
 
-    @property
-    def leak(self) -> list[Fraction]:
-        """The p = ε θ* of a composition."""
-        return self.vectors["leak"]
+    Each of 28 terms is cut to the grid and moved by the cuts before it: within 2^-150 together; the rest of the series
+    is below 2^-28 / 28! < 2^-125. Both, and what halving drops of the angle, are inside the room of 2^-88.
+    """
+    if abs(x) > 100 << SCALE:
+        raise NotProvedError("an angle of the machine is beyond 100 rad")
+    doublings = 0
+    while abs(x) > 1 << (SCALE - 1):
+        x, doublings = x >> 1, doublings + 1
+    term, sums = 1 << SCALE, [1 << SCALE, 0]
+    for k in range(1, 28):
+        term = (term * x >> SCALE) // k
+        sums[k % 2] += -term if k % 4 > 1 else term
+    room = 1 << (SCALE - 88)
+    cosine, sine = ((v - room, v + room) for v in sums)
+    for _ in range(doublings):
+        sine, cosine = fixed_product((2 << SCALE, 2 << SCALE), fixed_product(sine, cosine)), fixed_square(sine)
+        cosine = (1 << SCALE) - 2 * cosine[1], (1 << SCALE) - 2 * cosine[0]
+    return sine, cosine
 
+
+def fixed_sincos(a: Fixed) -> tuple[Fixed, Fixed]:
+    """Ranges of sine and cosine.
+
+    By value and slope at the middle with a curvature of at most 1; where the other one keeps its sign, by the ends.
+    """
+    one, middle = 1 << SCALE, (a[0] + a[1]) >> 1
+    radius = max(a[1] - middle, middle - a[0])
+    sine, cosine = fixed_turn(middle)
+    bend = fixed_product((radius, radius), (radius, radius))[1] // 2 + 1
+
+    def around(value: Fixed, slope: Fixed) -> Fixed:
+        reach = fixed_product(slope, (-radius, radius))
+        return max(-one, value[0] + reach[0] - bend), min(one, value[1] + reach[1] + bend)
+
+    sines, cosines = around(sine, cosine), around(cosine, (-sine[1], -sine[0]))
+    (first, last), keeps = (fixed_turn(a[0]), fixed_turn(a[1])), lambda b: not b[0] <= 0 <= b[1]
+    if keeps(cosines):
+        sines = max(sines[0], min(first[0][0], last[0][0])), min(sines[1], max(first[0][1], last[0][1]))
+    if keeps(sines):
+        cosines = max(cosines[0], min(first[1][0], last[1][0])), min(cosines[1], max(first[1][1], last[1][1]))
+    return sines, cosines
+
+
+def fixed_tanh(a: Fixed) -> Fixed:
+    """Range of tanh."""
+    low, high = (tanh_point(Fraction(end, 1 << SCALE)) for end in a)
+    return to_fixed((low[0], high[1]))
+
+
+def slopes(program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[str, dict[str, Interval]]) -> list[Any]:
+    """Range of every output and its derivatives along named directions, over the ranges of the inputs.
+
+    Args:
+        program: Operation list.
+        ranges: Range of each input.
+        tangents: Derivatives of the inputs along each direction.
+
+    Returns:
+        A pair for each output, in fractions.
+    """
+    inputs = {name: to_fixed(value) for name, value in ranges.items()}
+    moving = {name: {d: to_fixed(v) for d, v in along.items()} for name, along in tangents.items()}
+
+    def const(value: Fraction) -> Slope:
+        return to_fixed((value, value)), {}
+
+    entries = walk(program, lambda name: (inputs[name], moving.get(name, {})), const, _slope)
+    return [
+        (from_fixed(value), {d: from_fixed(v) for d, v in along.items()})
+        for value, along in (entries[index] for index in program["outputs"])
+    ]
+
+
+def _slope(operator: str, a: Slope, b: Slope | None = None) -> Slope:
+    """One operation and its derivatives."""
+    x, dx = a
+    if b is not None:
+        return _slope_of_two(operator, a, b)
+    if operator == "neg":
+        return (-x[1], -x[0]), {d: (-v[1], -v[0]) for d, v in dx.items()}
+    if operator == "sq":
+        return fixed_square(x), _scaled(dx, (2 * x[0], 2 * x[1]))
+    if operator == "sqrt":
+        value = fixed_root(x)
+        return value, _scaled(dx, fixed_inverse((2 * value[0], 2 * value[1]))) if dx else {}
+    if operator == "tanh":
+        value, one = fixed_tanh(x), 1 << SCALE
+        square = fixed_square(value)
+        return value, _scaled(dx, (max(0, one - square[1]), min(one, one - square[0])))
+    sine, cosine = fixed_sincos(x)
+    return (sine, _scaled(dx, cosine)) if operator == "sin" else (cosine, _scaled(dx, (-sine[1], -sine[0])))
+
+
+def _slope_of_two(operator: str, a: Slope, b: Slope) -> Slope:
+    (x, dx), (y, dy) = a, b
+    if operator == "add":
+        return (x[0] + y[0], x[1] + y[1]), _together(dx, dy)
+    if operator == "sub":
+        return (x[0] - y[1], x[1] - y[0]), _together(dx, {d: (-v[1], -v[0]) for d, v in dy.items()})
+    if operator == "mul":
+        return fixed_product(x, y), _together(_scaled(dx, y), _scaled(dy, x))
+    back = fixed_inverse(y)
+    ratio = fixed_product(x, back)
+    return ratio, _scaled(_together(dx, _scaled(dy, (-ratio[1], -ratio[0]))), back)
+
+
+def _scaled(along: dict[str, Fixed], factor: Fixed) -> dict[str, Fixed]:
+    return {d: fixed_product(v, factor) for d, v in along.items()}
+
+
+def _together(first: dict[str, Fixed], second: dict[str, Fixed]) -> dict[str, Fixed]:
+    if not second:
+        return first
+    found = dict(first)
+    for d, v in second.items():
+        old = found.get(d)
+        found[d] = v if old is None else (old[0] + v[0], old[1] + v[1])
+    return found
+
+
+# --- parsing ---
 
 def wrong_schema(found: Any) -> str:
     """What to say to a file of another kind or version."""
-    return f'this release reads "{SCHEMA}": got {str(found)[:60]!r}; use the release that wrote the file'
+    old = "hdmm-opt 0.1 reads it" if found == "hdmm-opt/gains/1" else "use the release that wrote the file"
+    return f'this release reads "{SCHEMA}": got {str(found)[:60]!r}; {old}'
 
 
 def number(value: Any, what: str) -> Fraction:
@@ -501,17 +665,6 @@ def numbers(value: Any, count: int, what: str) -> list[Fraction]:
     """A list of numbers of a given length."""
     need(isinstance(value, list) and len(value) == count, f"{what} must list {count} numbers")
     return [number(entry, what) for entry in value]
-
-
-def cell_of(entry: dict[str, Any], count: int) -> Cell:
-    """One cell of a sampled certificate."""
-    rows = entry["transform"]
-    need(isinstance(rows, list) and len(rows) == count, f"a transform must have {count} rows")
-    vectors = [numbers(entry[name], count, name) for name in VECTORS["sampled"]]
-    transform = [numbers(row, count, "a transform") for row in rows]
-    longest = max(len(str(v)) for row in (*transform, *vectors) for v in row)
-    need(longest <= MAX_CELL_DIGITS, f"a cell's numbers have at most {MAX_CELL_DIGITS} digits")
-    return Cell(transform, *vectors)
 
 
 def parse(text: str) -> dict[str, Any]:
@@ -550,17 +703,16 @@ def digest(text_or_data: Any, *leave_out: str) -> str:
 def check_digests(text: str) -> None:
     """Refuse a file whose content does not match the hashes it carries."""
     plain = json.loads(text)
-    for part in ("study", "reference"):
-        section = plain.get(part)
-        need(isinstance(section, dict), f'the section "{part}" is missing; write the file again with design')
-        need(
-            section.get("sha256") == digest(section, "sha256"),
-            f'"{part}" was changed after the file was written (sha256 differs)',
-        )
-    need(
-        plain.get("sha256") == digest(plain, "sha256", "provenance"),
-        "the file was changed after it was written (sha256 differs)",
-    )
+    parts = [("study", plain.get("study"))]
+    members = plain.get("members")
+    need(isinstance(members, list) and all(isinstance(m, dict) for m in members), "the members are missing")
+    parts += [(f"the reference of {m.get('name')!r:.40}", m.get("reference")) for m in members]
+    for part, section in parts:
+        need(isinstance(section, dict), f"{part} is missing; write the file again with design")
+        same = section.get("sha256") == digest(section, "sha256")
+        need(same, f"{part} was changed after the file was written (sha256 differs)")
+    whole = plain.get("sha256") == digest(plain, "sha256", "provenance")
+    need(whole, "the file was changed after it was written (sha256 differs)")
 
 
 def valid_program(program: Any, what: str, *, turning: bool = False) -> dict[str, Any]:
@@ -615,145 +767,94 @@ def reads(program: dict[str, Any], outputs: Iterable[int] | None = None) -> set[
     return names
 
 
-def read(data: dict[str, Any]) -> Claim:
-    """Read and cross-check the statement: study, assumptions, gains, model, certificate."""
-    try:
-        return _read(data)
-    except (KeyError, TypeError, AttributeError, IndexError) as error:
-        raise UnreadableError(f"a part of the gain file is missing or has the wrong type: {error}") from None
+# --- claim ---
+
+@dataclass(frozen=True)
+class Gain:
+    """Gains of one controlled row, as intervals."""
+
+    beta: Interval
+    epsilon: Interval
+    delta: Interval
+    sigma: Interval
 
 
-def _read(data: dict[str, Any]) -> Claim:
-    study, controller, certificate = data["study"], data["controller"], data["certificate"]
-    need(controller["law"] in REQUIRED, f"unknown law {controller['law']!r:.40}; known: {', '.join(REQUIRED)}")
-    kind = certificate["kind"]
-    need(kind in VECTORS, f"unknown certificate kind {kind!r:.40}; known: {', '.join(VECTORS)}")
-    model = certificate["model"]
-    rows = model["rows"]
-    n, m = len(rows), len(model["inputs"])
-    need(1 <= n <= MAX_ROWS and 1 <= m <= n, f"1 to {MAX_ROWS} rows are needed: got {n}")
-    for i, row in enumerate(rows):
-        target = row["target"]
-        if target not in ("reference", "zero"):
-            row["target"] = index(target, i, "a row's target")
-            need(rows[row["target"]]["governed"] is True, "a row's target must be a governed row")
-        need(isinstance(row["governed"], bool) and isinstance(row["state"], str), "a row needs a state and governed")
-    need(rows[0]["target"] == "reference", "the first row must track the reference")
-    governed = [i for i, row in enumerate(rows) if row["governed"]]
-    drives = [index(d, n, "an input's row") for d in model["drives"]]
-    need(
-        len(drives) == m and all(rows[d]["governed"] for d in drives),
-        "each input must be the control of a governed row",
-    )
-    plant = valid_program(model["plant"], "the plant")
-    law = [valid_program(term, "a modelling term") for term in model["law"]]
-    need(len(plant["outputs"]) == 2 * n and len(law) == len(governed), "the model does not fit the rows")
+@dataclass(frozen=True)
+class Cell:
+    """W, R, P and s of a sampled certificate for a part of the inertias' ranges."""
 
-    assumed = assumptions(data["assumptions"], study)
-    states, parameters = [row["state"] for row in rows], assumed["parameter"]
-    need(not set(controller["nominal"]) & set(assumed["feedforward"]), "a foreseen disturbance has no nominal value")
-    need(reads(plant, plant["outputs"][:n]) <= set(parameters), "an inertia depends on more than constant parameters")
-    nominal = {name: number(value, "a nominal value") for name, value in controller["nominal"].items()}
-    listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], "r0", "r1", "r2", "r3"]
-    for name in (*listed, *nominal, *(str(limit["name"]) for limit in study["plant"]["limits"])):
-        need(isinstance(name, str) and NAME.fullmatch(name) is not None, "a name must be a plain identifier")
-    need(len(set(listed)) == len(listed), "a name stands for two different signals")
-    need(reads(plant) <= set(listed) - {"r0", "r1", "r2", "r3"}, "the plant reads a name without an assumption")
-    unread = {*parameters, *assumed["disturbance"]} - reads(plant)
-    need(not unread, f"the plant does not use {', '.join(sorted(unread))}, which the study states")
-    for term in law:  # r3, the jerk, has no bounded rate
-        allowed = {*states, "r0", "r1", "r2", *(f"nominal.{name}" for name in {**nominal, **assumed["feedforward"]})}
-        need(reads(term) <= allowed, "a modelling term reads what a controller cannot know")
-
-    given = {entry["name"]: number(entry["value"], entry["name"]) for entry in data["gains"]}
-    names = [f"{kind}_{k + 1}" for k in range(len(governed)) for kind in ("beta", "epsilon", "delta", "sigma")]
-    need(set(given) == set(names) and len(data["gains"]) == len(names), "the gains do not fit the subsystems")
-    gains = [
-        tuple(given[f"{kind}_{k + 1}"] for kind in ("beta", "epsilon", "delta", "sigma")) for k in range(len(governed))
-    ]
-    need(all(b > 0 and e >= 0 and d > 0 and s > 0 for b, e, d, s in gains), "gains must be positive")
-    for name, value in given.items():
-        wanted = study["controller"]["gains"].get(name, {})
-        low, high = wanted.get("value", wanted.get("min", value)), wanted.get("value", wanted.get("max", value))
-        need(number(low, name) <= value <= number(high, name), f"{name} is outside the range of the study")
-    rate = number(controller["rate_hz"], "rate_hz")
-    apart = abs(number(controller["period_s"], "period_s") * rate - 1)
-    need(apart < Fraction(1, 10**12), "period_s is not 1 / rate_hz")
-    told = [(s["state"], s["tracks"], s["governed"]) for s in controller["subsystems"]]
-    need(told == [(r["state"], r["target"], r["governed"]) for r in rows], "the subsystems are not those of the model")
-    need(controller["modelling"] == study["controller"]["modelling"], "the modelling terms differ from the study's")
-    need(
-        rate > 0 and rate == number(study["controller"]["rate_hz"], "rate_hz"),
-        "the control rate differs from the study's",
-    )
-    split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]] if kind == "sampled" else []
-    cells = [cell_of(entry, n) for entry in certificate["cells"]] if kind == "sampled" else []
-    covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod(split)
-    need(kind != "sampled" or covered, "the cells do not cover the inertias")
-    limits, stroke = study["plant"]["limits"], numbers(study["plant"]["stroke_m"], 2, "stroke_m")
-    need(
-        limits and all(limit["signals"] and set(limit["signals"]) <= {*states, *model["inputs"]} for limit in limits),
-        "a limit names an unknown signal",
-    )
-    plain = [isinstance(x["unit"], str) and re.fullmatch(r"[ -~]{1,40}", x["unit"]) for x in limits]
-    need(all(plain), "a limit's unit must be printable text")
-    need(set(limits[0]["signals"]) == set(model["inputs"]), "the first limit must be the amplitude limit of the inputs")
-    return Claim(
-        rows=rows, drives=drives, inputs=model["inputs"], plant=plant, law=law, parameters=parameters,
-        disturbances=assumed["disturbance"], nominal=nominal, reference=reference_bounds(data["reference"]),
-        noise=[magnitude(assumed["noise"][s]) for s in states],
-        initial=[magnitude(assumed["initial"][s]) for s in states],
-        period=1 / rate, gains=gains, kind=kind, decay=number(certificate["decay"], "decay"),
-        vectors={name: numbers(certificate[name], n, name) for name in VECTORS[kind] if kind == "composition"},
-        split=split, cells=cells,
-        radii=numbers(certificate["radii"], n, "radii"),
-        held=numbers(certificate["held"], m, "held"), ball=numbers(certificate["envelope"]["ball"], n, "ball"),
-        limits=[{**limit, "value": number(limit["value"], "a limit")} for limit in limits],
-        stroke=(stroke[0], stroke[1]), accuracy=number(study["requirements"]["tracking_error_m"], "tracking_error_m"),
-        transient=number(study["validation"]["transient_s"], "transient_s"),
-        feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
-    )  # fmt: skip
+    transform: list[list[Fraction]]
+    reach: list[Fraction]
+    start: list[Fraction]
+    shape: list[Fraction]
 
 
-def assumptions(entries: list[dict[str, Any]], study: dict[str, Any]) -> dict[str, dict[str, Interval]]:
-    """The assumptions by kind; each must cover what the study states."""
-    kinds = ("parameter", "disturbance", "noise", "initial", "feedforward", "feedforward_rate")
-    found: dict[str, dict[str, Interval]] = {kind: {} for kind in kinds}
-    for entry in entries:
-        kind, _, name = entry["name"].partition(".")
-        bounds = number(entry["lower"], entry["name"]), number(entry["upper"], entry["name"])
-        need(kind in found and name not in found[kind], f"unknown or doubled assumption {entry['name']!r:.60}")
-        need(bounds[0] <= bounds[1], f"{entry['name']}: lower > upper")
-        found[kind][name] = bounds
-    uncertainty = study["uncertainty"]
-    stated: list[tuple[str, str, Fraction, Fraction]] = []
-    for name, entry in study["plant"]["parameters"].items():
-        value, spread = (
-            number(entry["value"], name),
-            abs(number(entry["value"], name)) * number(entry["tolerance"], name),
-        )
-        stated.append(("parameter", name, value - spread, value + spread))
-    for name, (low, high) in uncertainty["disturbances"].items():
-        stated.append(("disturbance", name, number(low, name), number(high, name)))
-    for kind in ("noise", "initial"):
-        for name, value in uncertainty[kind].items():
-            stated.append((kind, name, -number(value, name), number(value, name)))
-    for kind in ("feedforward", "feedforward_rate"):
-        for name, (low, high) in uncertainty.get(kind, {}).items():
-            stated.append((kind, name, number(low, name), number(high, name)))
-    foreseen = set(found["feedforward"])
-    need(foreseen == set(found["feedforward_rate"]), "a foreseen disturbance needs a range and a range of its rate")
-    need(foreseen <= set(found["disturbance"]), "a foreseen disturbance must be a disturbance")
-    need(
-        {(k, n) for k, n, _, _ in stated} == {(k, n) for k, of in found.items() for n in of},
-        "the assumptions are not those of the study",
-    )
-    for kind, name, low, high in stated:
-        bounds = found[kind][name]
-        need(low <= high, f"the study's range of {name} is upside down")
-        need(bounds[0] <= low and high <= bounds[1], f"the assumption {kind}.{name} is narrower than the study's")
-    return found
+@dataclass(frozen=True)
+class Claim:
+    """Everything that the checker reads from a file."""
 
+    name: str
+    rows: list[dict[str, Any]]
+    input_map: list[int]
+    inputs: list[str]
+    plant: dict[str, Any]
+    law: list[dict[str, Any]]
+    parameters: dict[str, Interval]
+    disturbances: dict[str, Interval]
+    nominal: dict[str, Fraction]
+    reference: list[Interval]
+    noise: list[Fraction]
+    initial: list[Fraction]
+    period: Fraction
+    gains: list[tuple[Fraction, ...]]
+    kind: str
+    decay: Fraction
+    vectors: dict[str, list[Fraction]]
+    split: list[int]
+    cells: list[Cell]
+    half_widths: list[Fraction]
+    input_bound: list[Fraction]
+    ultimate: list[Fraction]
+    limits: list[dict[str, Any]]
+    stroke: Interval
+    accuracy: Fraction
+    transient: Fraction
+    feedforward: dict[str, tuple[Interval, Interval]] = field(default_factory=dict)
+    first: str = "position"
+
+    @property
+    def controlled(self) -> list[int]:
+        """Indices of the rows with gains."""
+        return [i for i, row in enumerate(self.rows) if row["controlled"]]
+
+    @property
+    def weights(self) -> list[Fraction]:
+        """Weights w of a composition."""
+        return self.vectors["weights"]
+
+    @property
+    def young(self) -> list[Fraction]:
+        """Young's ν of a composition."""
+        return self.vectors["young"]
+
+    @property
+    def leak(self) -> list[Fraction]:
+        """The p = ε θ* of a composition."""
+        return self.vectors["leak"]
+
+
+def cell_of(entry: dict[str, Any], count: int) -> Cell:
+    """One cell of a sampled certificate."""
+    rows = entry["transform"]
+    need(isinstance(rows, list) and len(rows) == count, f"a transform must have {count} rows")
+    vectors = [numbers(entry[name], count, name) for name in VECTORS["sampled"]]
+    transform = [numbers(row, count, "a transform") for row in rows]
+    longest = max(len(str(v)) for row in (*transform, *vectors) for v in row)
+    need(longest <= MAX_CELL_DIGITS, f"a cell's numbers have at most {MAX_CELL_DIGITS} digits")
+    return Cell(transform, *vectors)
+
+
+# --- reference ---
 
 def reference_bounds(reference: dict[str, Any]) -> list[Interval]:
     """Position … jerk of the splines, from their control points; refuses jumps and a moving end."""
@@ -792,8 +893,215 @@ def reference_bounds(reference: dict[str, Any]) -> list[Interval]:
     return [(min(h + zero), max(h + zero)) for h, zero in zip(hulls, at_rest, strict=True)]
 
 
-# --- the closed loop in error coordinates -------------------------------------------------------------------------
+# --- reading ---
 
+def read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
+    """Read and cross-check the statement about a member: study, assumptions, gains, model, certificate."""
+    try:
+        return _read(data, entry, coupled)
+    except (KeyError, TypeError, AttributeError, IndexError) as error:
+        raise UnreadableError(f"a part of the gain file is missing or has the wrong type: {error}") from None
+
+
+def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
+    study, certificate, model = data["study"], entry["certificate"], entry["model"]
+    controller, section = study["controller"], study["plant"]["joints"][entry["name"]]
+    law = controller["law"]
+    need(law in REQUIRED, f"unknown law {law!r:.40}; known: {', '.join(REQUIRED)}")
+    kind = certificate["kind"]
+    need(kind in REQUIRED[law], f"unknown certificate kind {kind!r:.40}; known: {', '.join(REQUIRED[law])}")
+    rows, controlled, input_map = rows_of(model)
+    need(model["first"] in ("position", "speed"), "the first state is a position or a speed")
+    n, m, states = len(rows), len(model["inputs"]), [row["state"] for row in rows]
+    plant = valid_program(model["plant"], "the plant")
+    terms = [valid_program(term, "a modelling term") for term in model["law"]]
+    need(len(plant["outputs"]) == 2 * n and len(terms) == len(controlled), "the model does not fit the rows")
+    assumed = assumptions(entry["assumptions"], study, section, states, coupled)
+    nominal = {name: number(value, "a nominal value") for name, value in entry["nominal"].items()}
+    limits = limits_of(model, section, states)
+    check_names(model, plant, terms, assumed, nominal, limits, states)
+    watched = controller.get("observer") is not None
+    need(("observer" in entry) == watched, "members have an observer where the study asks for one, and only there")
+    rate = number(controller.get("rates_hz", {}).get(entry["name"], controller["rate_hz"]), "rate_hz")
+    transient = number(study["validation"]["transient_s"], "transient_s")
+    need(rate > 0 and transient >= 0, "the control rate must be positive, the transient not negative")
+    split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]] if kind == "sampled" else []
+    cells = [cell_of(cell, n) for cell in certificate["cells"]] if kind == "sampled" else []
+    covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod(split)
+    need(kind != "sampled" or covered, "the cells do not cover the inertias")
+    stroke = numbers(section["stroke"], 2, "stroke")
+    return Claim(
+        name=entry["name"], rows=rows, input_map=input_map, inputs=model["inputs"], plant=plant, law=terms,
+        parameters=assumed["parameter"], disturbances=assumed["disturbance"], nominal=nominal,
+        reference=reference_bounds(entry["reference"]),
+        noise=[magnitude(assumed["noise"][s]) for s in states],
+        initial=[magnitude(assumed["initial"][s]) for s in states],
+        period=1 / rate, gains=gains_of(entry["gains"], controlled, study, entry["name"]), kind=kind,
+        decay=number(certificate["decay"], "decay"),
+        vectors={name: numbers(certificate[name], n, name) for name in VECTORS[kind] if kind == "composition"},
+        split=split, cells=cells, half_widths=numbers(certificate["half_widths"], n, "half_widths"),
+        input_bound=numbers(certificate["input_bound"], m, "input_bound"),
+        ultimate=numbers(certificate["envelope"]["ultimate"], n, "ultimate"),
+        limits=limits, stroke=(stroke[0], stroke[1]), accuracy=accuracy_of(study, entry["name"]),
+        transient=transient,
+        feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
+        first=model["first"],
+    )  # fmt: skip
+
+
+def rows_of(model: dict[str, Any]) -> tuple[list[dict[str, Any]], list[int], list[int]]:
+    """The subsystems, indices of those with gains, and the row of each input."""
+    rows = model["rows"]
+    n, m = len(rows), len(model["inputs"])
+    need(1 <= n <= MAX_ROWS and 1 <= m <= n, f"1 to {MAX_ROWS} rows are needed: got {n}")
+    for i, row in enumerate(rows):
+        target = row["target"]
+        if target not in ("reference", "zero"):
+            row["target"] = index(target, i, "a row's target")
+            need(rows[row["target"]]["controlled"] is True, "a row's target must be a controlled row")
+        need(
+            isinstance(row["controlled"], bool) and isinstance(row["state"], str), "a row needs a state and controlled"
+        )
+        need(printable(row["unit"]), "a row's unit must be printable text")
+    need(rows[0]["target"] == "reference", "the first row must track the reference")
+    controlled = [i for i, row in enumerate(rows) if row["controlled"]]
+    input_map = [index(d, n, "an input's row") for d in model["input_map"]]
+    good = len(input_map) == m and all(rows[d]["controlled"] for d in input_map)
+    need(good, "each input must be the control of a controlled row")
+    return rows, controlled, input_map
+
+
+def limits_of(model: dict[str, Any], section: dict[str, Any], states: list[str]) -> list[dict[str, Any]]:
+    """The study's limits on the signals that the model names for each; the first is the amplitude limit."""
+    limits, given = model["limits"], section["limits"]
+    known = {*states, *model["inputs"]}
+    need(limits and [x["name"] for x in limits] == list(given), "the limits of the model are not those of the study")
+    need(all(x["signals"] and set(x["signals"]) <= known for x in limits), "a limit names an unknown signal")
+    need(all(printable(value["unit"]) for value in given.values()), "a limit's unit must be printable text")
+    need(set(limits[0]["signals"]) == set(model["inputs"]), "the first limit must be the amplitude limit of the inputs")
+    return [
+        {"name": x["name"], "signals": x["signals"], "unit": given[x["name"]]["unit"],
+         "value": number(given[x["name"]]["value"], "a limit")}
+        for x in limits
+    ]  # fmt: skip
+
+
+def check_names(
+    model: dict[str, Any], plant: dict[str, Any], terms: list[dict[str, Any]], assumed: dict[str, dict[str, Interval]],
+    nominal: dict[str, Fraction], limits: list[dict[str, Any]], states: list[str],
+) -> None:  # fmt: skip
+    """Refuse a model that reads what has no assumption, or a law that reads what a controller cannot know."""
+    parameters = assumed["parameter"]
+    need(not set(nominal) & set(assumed["feedforward"]), "a foreseen disturbance has no nominal value")
+    need(reads(plant, plant["outputs"][: len(states)]) <= set(parameters), "an inertia depends on more than parameters")
+    listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], "r0", "r1", "r2", "r3"]
+    for name in (*listed, *nominal, *(str(limit["name"]) for limit in limits)):
+        need(isinstance(name, str) and NAME.fullmatch(name) is not None, "a name must be a plain identifier")
+    need(len(set(listed)) == len(listed), "a name stands for two different signals")
+    need(reads(plant) <= set(listed) - {"r0", "r1", "r2", "r3"}, "the plant reads a name without an assumption")
+    unread = {*parameters, *assumed["disturbance"]} - reads(plant)
+    need(not unread, f"the plant does not use {', '.join(sorted(unread))}, which the study states")
+    foreseen = {*nominal, *assumed["feedforward"]}
+    for term in terms:  # r3, the jerk, has no bounded rate
+        allowed = {*states, "r0", "r1", "r2", *(f"nominal.{name}" for name in foreseen)}
+        need(reads(term) <= allowed, "a modelling term reads what a controller cannot know")
+
+
+def gains_of(
+    entries: list[dict[str, Any]], controlled: list[int], study: dict[str, Any], name: str
+) -> list[tuple[Fraction, ...]]:
+    """β, ε, δ, σ of each controlled row, inside the ranges of the file and of the study."""
+    kinds = ("beta", "epsilon", "delta", "sigma")
+    given = {entry["name"]: number(entry["value"], entry["name"]) for entry in entries}
+    names = [f"{kind}_{k + 1}" for k in range(len(controlled)) for kind in kinds]
+    need(set(given) == set(names) and len(entries) == len(names), "the gains do not fit the subsystems")
+    gains = [tuple(given[f"{kind}_{k + 1}"] for kind in kinds) for k in range(len(controlled))]
+    need(all(b > 0 and e >= 0 and d > 0 and s > 0 for b, e, d, s in gains), "gains must be positive")
+    ranges = study["controller"]["members"][name]
+    for entry in entries:
+        key, value = entry["name"], given[entry["name"]]
+        wanted = ranges[key]
+        low, high = wanted.get("value", wanted.get("min")), wanted.get("value", wanted.get("max"))
+        need((low, high) == (entry["min"], entry["max"]), f"the range of {key} is not the study's")
+        need(number(low, key) <= value <= number(high, key), f"{key} is outside the range of the study")
+    return gains
+
+
+def accuracy_of(study: dict[str, Any], name: str) -> Fraction:
+    """The required bound on a member's error: its own, or where it is the only one that of the machine."""
+    own = study["requirements"].get("member_error", {})
+    need(name in own or len(study["plant"]["joints"]) == 1, f"the study requires no error of {name}")
+    return number(own.get(name, study["requirements"]["tracking_error_m"]), "the required error")
+
+
+def assumptions(
+    entries: list[dict[str, Any]], study: dict[str, Any], section: dict[str, Any], states: list[str], coupled: bool
+) -> dict[str, dict[str, Interval]]:
+    """The assumptions by kind; each must cover what the study states.
+
+    What a coupling does to a member, and what an observer measures, is decided by obligations of their own.
+    """
+    kinds = ("parameter", "disturbance", "noise", "initial", "feedforward", "feedforward_rate")
+    found: dict[str, dict[str, Interval]] = {kind: {} for kind in kinds}
+    for entry in entries:
+        kind, _, name = entry["name"].partition(".")
+        bounds = number(entry["lower"], entry["name"]), number(entry["upper"], entry["name"])
+        need(kind in found and name not in found[kind], f"unknown or doubled assumption {entry['name']!r:.60}")
+        need(bounds[0] <= bounds[1], f"{entry['name']}: lower > upper")
+        found[kind][name] = bounds
+    need(
+        set(found["noise"]) == set(found["initial"]) == set(states), "noise and initial errors are those of the states"
+    )
+    foreseen = set(found["feedforward"])
+    need(foreseen == set(found["feedforward_rate"]), "a foreseen disturbance needs a range and a range of its rate")
+    need(foreseen <= (set(found["disturbance"]) if coupled else set()), "only the load of a coupling is foreseen")
+    stated = stated_ranges(study, section, states, coupled)
+    carried = {name for name in found["parameter"] if coupled and name in CARRIED}
+    listed = {name for kind, name, _, _ in stated if kind == "parameter"}
+    need(listed == set(found["parameter"]) - carried, "the parameters are not those of the study")
+    for kind, name, low, high in stated:
+        need(name in found[kind], f"the assumption {kind}.{name} is missing")
+        bounds = found[kind][name]
+        need(low <= high, f"the study's range of {name} is upside down")
+        need(bounds[0] <= low and high <= bounds[1], f"the assumption {kind}.{name} is narrower than the study's")
+    if not coupled:
+        disturbed = {name for kind, name, _, _ in stated if kind == "disturbance"}
+        need(disturbed == set(found["disturbance"]), "the disturbances are not those of the study")
+    return found
+
+
+def stated_ranges(
+    study: dict[str, Any], section: dict[str, Any], states: list[str], coupled: bool
+) -> list[tuple[str, str, Fraction, Fraction]]:
+    """Kind, name and range of everything that the study states of a member."""
+    uncertainty, stated = study["uncertainty"], []
+    for name, entry in section["parameters"].items():
+        value = number(entry["value"], name)
+        spread = abs(value) * number(entry["tolerance"], name)
+        stated.append(("parameter", name, value - spread, value + spread))
+    if "least_effectiveness" in section:
+        least = number(section["least_effectiveness"], "least_effectiveness")
+        need(0 <= least <= 1, "an actuator delivers between nothing and all of its torque")
+        stated.append(("parameter", "effectiveness", least, Fraction(1)))
+    for name, entry in {} if coupled else uncertainty["disturbances"].items():
+        low, high = numbers(entry["range"], 2, name)
+        stated.append(("disturbance", name, low, high))
+    observed = study["controller"].get("observer") is not None
+    for kind in ("noise", "initial"):
+        given = uncertainty.get(kind, {})
+        for k, state in enumerate(states):
+            value = number(given.get(state, Fraction(0)), f"{kind} of {state}")
+            if kind == "initial" or k > 1 or not observed:
+                stated.append((kind, state, -value, value))
+    return stated
+
+
+def printable(unit: Any) -> bool:
+    """Whether a unit is short printable text."""
+    return isinstance(unit, str) and re.fullmatch(r"[ -~]{1,40}", unit) is not None
+
+
+# --- loop ---
 
 class Loop:
     """M_i Q_i' = sum_j S_ij Q_j + d_i over the assumed box, with every entry an interval."""
@@ -803,9 +1111,9 @@ class Loop:
     def __init__(self, claim: Claim, inflate: Fraction) -> None:
         self.claim, self.table = claim, Table()
         self.gain: dict[int, Gain] = {}
-        for i, values in zip(claim.governed, claim.gains, strict=True):
+        for i, values in zip(claim.controlled, claim.gains, strict=True):
             self.gain[i] = Gain(*((v * (1 - inflate), v * (1 + inflate)) for v in values))
-        self.term = dict(zip(claim.governed, claim.law, strict=True))
+        self.term = dict(zip(claim.controlled, claim.law, strict=True))
         self.theta: dict[int, Fraction] = {}
         self.theta_rate: dict[int, Fraction] = {}
         self.half: dict[int, Interval] = {}
@@ -829,15 +1137,15 @@ class Loop:
         for k, bounds in enumerate(claim.reference):
             table.ranges[f"r{k}"] = bounds
             self._name(f"r{k}", {f"r{k}": ONE})
-        for i, radius in enumerate(claim.radii):
+        for i, radius in enumerate(claim.half_widths):
             table.ranges[f"Q{i}"] = symmetric(radius)
-        for k, error in enumerate(claim.held):
+        for k, error in enumerate(claim.input_bound):
             table.ranges[f"e{k}"] = symmetric(error)
         for i, row in enumerate(claim.rows):
             self._name(row["state"], plus({f"Q{i}": ONE}, self._target(i)))
         for i in self.gain:
             self._control(i)
-        for k, (name, row) in enumerate(zip(claim.inputs, claim.drives, strict=True)):
+        for k, (name, row) in enumerate(zip(claim.inputs, claim.input_map, strict=True)):
             self._name(name, plus(self._kappa(row), {f"e{k}": ONE}))
 
     def _name(self, name: str, form: Form) -> None:
@@ -870,7 +1178,7 @@ class Loop:
 
     def _error(self, i: int) -> Fraction:
         """Bound on |Q_i|."""
-        return self.claim.radii[i]
+        return self.claim.half_widths[i]
 
     def _noise(self, i: int) -> Fraction:
         target, own = self.claim.rows[i]["target"], self.claim.noise[i]
@@ -927,9 +1235,9 @@ class Loop:
         """The smallest effect of the own virtual control."""
         return self.open[i].get(f"K{i}", ZERO)[0]
 
-    def held_error(self, k: int) -> Fraction:
+    def input_error(self, k: int) -> Fraction:
         """T_s sup|κ'| plus what noise adds: bounds |u_k - κ_k(t)| within a period."""
-        row = self.claim.drives[k]
+        row = self.claim.input_map[k]
         speed = magnitude(self.table.over(self.table.expand(self.virtual[row])))
         return self.claim.period * speed + self._control_noise(row)
 
@@ -937,7 +1245,7 @@ class Loop:
         """Bound on |input| as commanded, or on |state|."""
         if name not in self.claim.inputs:
             return magnitude(self.nodes[name].range)
-        row = self.claim.drives[self.claim.inputs.index(name)]
+        row = self.claim.input_map[self.claim.inputs.index(name)]
         return magnitude(self.table.over(self._kappa(row))) + self._beyond(row)
 
     def _beyond(self, row: int) -> Fraction:
@@ -948,15 +1256,17 @@ class Loop:
         """What sampling and noise add to θ̂' in the Lyapunov function."""
         gain, period = self.gain[i], self.claim.period
         error = period * magnitude(self.table.over(self.closed[i])) / self.mass[i][0] + self.noise[i]
-        squares = gain.epsilon[1] * gain.delta[1] * error * (2 * self.claim.radii[i] + error) / 2
+        squares = gain.epsilon[1] * gain.delta[1] * error * (2 * self.claim.half_widths[i] + error) / 2
         return up(gain.delta[1] * gain.sigma[1] * period * self.theta_rate[i] + squares)
 
+
+# --- deviation ---
 
 class Deviation(Loop):
     """M_i z_i' = sum_j J_ij z_j + sum_k B_ik e_k + d_i around the operating point x*(t).
 
     The symbols Q are the deviations z = x - x*; the symbols e are u - m(x(t), r(t)) = -K z(t_k) + noise + drift, all of
-    it inside the bounds `held`. x* follows from the reference: the term of a tracked row must not read a state.
+    it inside the bounds `input_bound`. x* follows from the reference: the term of a tracked row must not read a state.
     """
 
     moving = "Qe"
@@ -964,14 +1274,14 @@ class Deviation(Loop):
     def __init__(self, claim: Claim, inflate: Fraction) -> None:
         tracked = {row["target"] for row in claim.rows}
         states = {row["state"] for row in claim.rows}
-        for i, term in zip(claim.governed, claim.law, strict=True):
+        for i, term in zip(claim.controlled, claim.law, strict=True):
             need(i not in tracked or not states & reads(term), "the modelling term of a tracked row reads a state")
         super().__init__(claim, inflate)
 
     def _error(self, i: int) -> Fraction:
         target = self.claim.rows[i]["target"]
         upstream = Fraction(0) if isinstance(target, str) else self.half[target][1] * self._error(target)
-        return self.claim.radii[i] + upstream
+        return self.claim.half_widths[i] + upstream
 
     def _kappa(self, i: int) -> Form:
         self._control(i)
@@ -981,11 +1291,11 @@ class Deviation(Loop):
         return self.table.expand(derivative(self.term[i], self._ranges(), moving))
 
     def _beyond(self, row: int) -> Fraction:
-        return self.claim.held[self.claim.drives.index(row)]
+        return self.claim.input_bound[self.claim.input_map.index(row)]
 
     def feedback(self, k: int) -> list[Interval]:
         """K of input k: b_i Q_i, where Q_i = z_i + b_t Q_t."""
-        row = self.claim.drives[k]
+        row = self.claim.input_map[k]
         factor, found = self.half[row], [ZERO] * len(self.claim.rows)
         found[row] = factor
         while not isinstance(self.claim.rows[row]["target"], str):
@@ -995,14 +1305,14 @@ class Deviation(Loop):
 
     def drift(self, k: int) -> Fraction:
         """Bound on |d m_k(x(t), r(t)) / dt|."""
-        return magnitude(self.table.over(self.virtual[self.claim.drives[k]]))
+        return magnitude(self.table.over(self.virtual[self.claim.input_map[k]]))
 
     def noise_of(self, k: int) -> Fraction:
         """What measurement errors make of input k."""
-        return self._control_noise(self.claim.drives[k])
+        return self._control_noise(self.claim.input_map[k])
 
 
-# --- the map over a period ----------------------------------------------------------------------------------------
+# --- matrices ---
 
 Matrix = list[list[Fraction]]
 
@@ -1080,6 +1390,8 @@ def exponential_times(matrix: Matrix, columns: Matrix) -> Matrix:
     return [[Fraction(v, 1 << FIXED) for v in row] for row in total]
 
 
+# --- period ---
+
 def middle_and_spread(bounds: Interval, factor: Fraction) -> tuple[Fraction, Fraction]:
     """Middle of an interval times a positive factor, and distance of the ends from it."""
     low, high = down(bounds[0] * factor), up(bounds[1] * factor)
@@ -1090,14 +1402,14 @@ def middle_and_spread(bounds: Interval, factor: Fraction) -> tuple[Fraction, Fra
 class Period:
     """|y(t + T)| <= A |y| + b for y = W z, at every vertex of the uncertain inertias; see `docs/proof.md`.
 
-    Everything is in units of the box: z_i of radii_i, v_k of held_k, time of the period.
+    Everything is in units of the box: z_i of half_widths_i, v_k of input_bound_k, time of the period.
     """
 
     def __init__(self, claim: Claim, loop: Deviation, cell: Cell, masses: list[Interval]) -> None:
         self.claim, self.loop, self.cell, self.masses = claim, loop, cell, masses
         self.n, self.m = len(claim.rows), len(claim.inputs)
         self._nominal()
-        self.w = [[v * r for v, r in zip(row, claim.radii, strict=True)] for row in cell.transform]
+        self.w = [[v * r for v, r in zip(row, claim.half_widths, strict=True)] for row in cell.transform]
         self.back = inverse_of(self.w)
         self._rest()
         self._vertices()
@@ -1107,10 +1419,10 @@ class Period:
     def _half_way(self, i: int) -> Fraction:
         """T/2 sup|z_i'| over the box: how far z_i gets from the nearest sample."""
         claim, loop = self.claim, self.loop
-        force = sum((magnitude(loop.entry(i, j)) * r for j, r in enumerate(claim.radii)), loop.disturbance[i])
-        for k, held in enumerate(claim.held):
-            force += magnitude(loop.closed[i].get(f"e{k}", ZERO)) * held
-        return claim.period * force / (2 * self.masses[i][0] * claim.radii[i])
+        force = sum((magnitude(loop.entry(i, j)) * r for j, r in enumerate(claim.half_widths)), loop.disturbance[i])
+        for k, input_bound in enumerate(claim.input_bound):
+            force += magnitude(loop.closed[i].get(f"e{k}", ZERO)) * input_bound
+        return claim.period * force / (2 * self.masses[i][0] * claim.half_widths[i])
 
     def _nominal(self) -> None:
         claim, loop, n, m = self.claim, self.loop, self.n, self.m
@@ -1118,14 +1430,19 @@ class Period:
         self.change = [
             up(max(m0 / low - 1, 1 - m0 / high)) for m0, (low, high) in zip(self.mass, self.masses, strict=True)
         ]
-        rate = [claim.period / (m0 * r) for m0, r in zip(self.mass, claim.radii, strict=True)]
-        state = [[middle_and_spread(loop.entry(i, j), rate[i] * claim.radii[j]) for j in range(n)] for i in range(n)]
+        rate = [claim.period / (m0 * r) for m0, r in zip(self.mass, claim.half_widths, strict=True)]
+        state = [
+            [middle_and_spread(loop.entry(i, j), rate[i] * claim.half_widths[j]) for j in range(n)] for i in range(n)
+        ]
         entry = [
-            [middle_and_spread(loop.closed[i].get(f"e{k}", ZERO), rate[i] * claim.held[k]) for k in range(m)]
+            [middle_and_spread(loop.closed[i].get(f"e{k}", ZERO), rate[i] * claim.input_bound[k]) for k in range(m)]
             for i in range(n)
         ]
         feedback = [
-            [middle_and_spread(f, r / claim.held[k]) for f, r in zip(loop.feedback(k), claim.radii, strict=True)]
+            [
+                middle_and_spread(f, r / claim.input_bound[k])
+                for f, r in zip(loop.feedback(k), claim.half_widths, strict=True)
+            ]
             for k in range(m)
         ]
         (self.a, self.a_spread), (self.b, self.b_spread), (self.k, self.k_spread) = (
@@ -1133,8 +1450,8 @@ class Period:
             for part in (state, entry, feedback)
         )
         self.push = [up(d * r) for d, r in zip(loop.disturbance, rate, strict=True)]
-        self.noise = [up(loop.noise_of(k) / claim.held[k]) for k in range(m)]
-        self.drift = [up(claim.period * loop.drift(k) / claim.held[k]) for k in range(m)]
+        self.noise = [up(loop.noise_of(k) / claim.input_bound[k]) for k in range(m)]
+        self.drift = [up(claim.period * loop.drift(k) / claim.input_bound[k]) for k in range(m)]
         self.drive = sum_of(self.a, negative(product_of(self.b, self.k)))
 
     def _rest(self) -> None:
@@ -1193,14 +1510,14 @@ class Period:
         n, m, w, back = self.n, self.m, self.w, self.back
         whole = [[*a, *b] for a, b in zip(self.a, self.b, strict=True)] + [[Fraction(0)] * (n + m)] * m
         flow = exponential_times(whole, identity(n + m))
-        held = [row[n:] for row in flow[:n]]
-        entry = product_of(held, self.k)
+        input_bound = [row[n:] for row in flow[:n]]
+        entry = product_of(input_bound, self.k)
         closed = sum_of([row[:n] for row in flow[:n]], negative(entry))
         self.control = sum_of(absolute(product_of(self.k, back)), product_of(self.k_spread, absolute(back)))
         self.speed = absolute(product_of(self.drive, back))
         effects = {i: product_of(w, self._effect(i)) for i in range(n) if self.change[i] > 0}
         noise = [[v] for v in self.noise]
-        shaken = product_of(absolute(product_of(w, held)), noise)
+        shaken = product_of(absolute(product_of(w, input_bound)), noise)
         for i, effect in effects.items():
             direct = product_of(absolute(product_of(effect, self.b)), noise)
             shaken = sum_of(shaken, [[self.change[i] * v for v in row] for row in direct])
@@ -1290,8 +1607,7 @@ class Period:
         return [dot(row, bound) + noise + drift for row, noise, drift in rows]
 
 
-# --- the obligations ----------------------------------------------------------------------------------------------
-
+# --- obligation ---
 
 @dataclass(frozen=True)
 class Obligation:
@@ -1303,7 +1619,29 @@ class Obligation:
     unit: str
     verdict: str
     remedy: str = ""
+    member: str = ""
 
+
+@dataclass(frozen=True)
+class Report:
+    """The verdict on one file."""
+
+    file: str
+    status: int
+    message: str
+    obligations: list[Obligation] = field(default_factory=list)
+
+
+def decided(name: str, statement: str, margin: Fraction, unit: str, remedy: str, *, member: str = "",
+            strict: bool = True) -> Obligation:  # fmt: skip
+    """An obligation, proved where its margin is positive, or zero where that is enough."""
+    good = margin > 0 or (margin == 0 and not strict)
+    size = Fraction(10) ** 300
+    shown = float(max(-size, min(size, margin)))
+    return Obligation(name, statement, shown, unit, "proved" if good else "undecided", "" if good else remedy, member)
+
+
+# --- composition ---
 
 def positive_definite(matrix: list[list[Fraction]]) -> bool:
     """Strict definiteness of a symmetric rational matrix by exact LDLᵀ."""
@@ -1339,7 +1677,7 @@ def conditions_hold(claim: Claim, loop: Loop, spare: Fraction) -> bool:
 
 
 def leak_is_sound(claim: Claim, loop: Loop) -> bool:
-    """θ̂ may be part of V only in a governed row that adapts and whose gain cannot change sign."""
+    """θ̂ may be part of V only in a controlled row that adapts and whose gain cannot change sign."""
     used = [i for i, leak in enumerate(claim.leak) if leak > 0]
     return all(i in loop.gain and loop.gain[i].epsilon[0] > 0 and loop.own_gain(i) > 0 for i in used)
 
@@ -1402,21 +1740,21 @@ class Composed:
         claim, loop = self.claim, self.loop
         top = max(level(claim, loop), start(claim, loop))
         spare = []
-        for i, radius in enumerate(claim.radii):
+        for i, radius in enumerate(claim.half_widths):
             by_energy = root(up(2 * top / (claim.weights[i] * loop.mass[i][0])), True)
             pull, push = -loop.entry(i, i)[1], loop.disturbance[i]
-            push += sum(magnitude(loop.entry(i, j)) * r for j, r in enumerate(claim.radii) if j != i)
+            push += sum(magnitude(loop.entry(i, j)) * r for j, r in enumerate(claim.half_widths) if j != i)
             by_row = max(push / pull, claim.initial[i]) if pull > 0 else by_energy
             spare.append(1 - min(by_energy, by_row) / radius)
         return min(spare)
 
     def sampling(self) -> tuple[str, Fraction]:
         """The assumed input error against what the rows make of it."""
-        errors = [self.loop.held_error(k) for k in range(len(self.claim.held))]
-        spare = min(1 - e / h if h > 0 else -e for h, e in zip(self.claim.held, errors, strict=True))
+        errors = [self.loop.input_error(k) for k in range(len(self.claim.input_bound))]
+        spare = min(1 - e / h if h > 0 else -e for h, e in zip(self.claim.input_bound, errors, strict=True))
         return "held inputs stay within the assumed error of the continuous law", spare
 
-    def ball(self, i: int) -> Fraction:
+    def ultimate(self, i: int) -> Fraction:
         """Bound on |Q_i| from the end of the transient on: V <= c/μ + (V(0) - c/μ) exp(-μt) where V(0) > c/μ."""
         claim, loop = self.claim, self.loop
         settled = level(claim, loop)
@@ -1424,8 +1762,10 @@ class Composed:
         if excess > 0:
             settled += up(excess * exponential(-min(claim.decay * claim.transient, Fraction(100)))[1])
         energy = root(up(2 * settled / (claim.weights[i] * loop.mass[i][0])), True)
-        return min(energy, claim.radii[i])
+        return min(energy, claim.half_widths[i])
 
+
+# --- sampled ---
 
 class Held:
     """Verdicts of a sampled certificate: each cell of the inertias' ranges by itself."""
@@ -1472,7 +1812,7 @@ class Held:
             spare += [1 - v / r for v, r in pairs]
         return "the exact zero-order-hold map keeps the comparison bounds", min(spare)
 
-    def ball(self, i: int) -> Fraction:
+    def ultimate(self, i: int) -> Fraction:
         """Bound on |z_i| from the end of the transient on."""
         claim, found = self.claim, []
         time = max(Fraction(0), min(claim.decay * (claim.transient - claim.period), Fraction(100)))
@@ -1481,8 +1821,10 @@ class Held:
             cell = period.cell
             late = [min(r + s * left, p) for r, s, p in zip(cell.reach, cell.shape, cell.start, strict=True)]
             found.append(period.states(late)[i])
-        return min(up(max(found) * claim.radii[i]), claim.radii[i])
+        return min(up(max(found) * claim.half_widths[i]), claim.half_widths[i])
 
+
+# --- obligations ---
 
 def judge(claim: Claim, inflate: Fraction) -> tuple[Loop, Composed | Held]:
     """The closed loop for all gains within a relative distance, and the verdicts on it."""
@@ -1501,7 +1843,7 @@ def holds(claim: Claim, loop: Loop, verdict: Composed | Held) -> bool:
         and all(slack > 0 for slack, _, _ in authority(claim, loop))
         and verdict.sampling()[1] > 0
         and adaptation(claim, loop) >= 0
-        and verdict.ball(0) <= claim.accuracy
+        and verdict.ultimate(0) <= claim.accuracy
     )
 
 
@@ -1520,7 +1862,8 @@ def authority(claim: Claim, loop: Loop) -> list[tuple[Fraction, str, str]]:
         norm = root(up(sum((loop.signal(s) ** 2 for s in limit["signals"]), Fraction(0))), True)
         result.append((limit["value"] - norm, str(limit["unit"]), str(limit["name"])))
     position = loop.nodes[claim.rows[0]["state"]].range
-    result.append((min(position[0] - claim.stroke[0], claim.stroke[1] - position[1]), "m", "stroke"))
+    unit = str(claim.rows[0]["unit"])
+    result.append((min(position[0] - claim.stroke[0], claim.stroke[1] - position[1]), unit, "stroke"))
     return result
 
 
@@ -1537,28 +1880,27 @@ def adaptation(claim: Claim, loop: Loop) -> Fraction:
 def vacuity(claim: Claim) -> Fraction:
     """The smallest ratio of what must be inside to what holds it, turned into a margin."""
     may_be_zero = [*claim.noise, *claim.initial]
-    positive = [claim.decay, claim.period, claim.accuracy, *claim.radii]
+    positive = [claim.decay, claim.period, claim.accuracy, *claim.half_widths]
     positive += [v for cell in claim.cells for v in (*cell.reach, *cell.start, *cell.shape)]
-    for name, values in {**claim.vectors, "held": claim.held}.items():
-        (may_be_zero if name == "leak" or (name, claim.kind) == ("held", "composition") else positive).extend(values)
+    for name, values in {**claim.vectors, "input_bound": claim.input_bound}.items():
+        (may_be_zero if name == "leak" or (name, claim.kind) == ("input_bound", "composition") else positive).extend(
+            values
+        )
     positive += [limit["value"] for limit in claim.limits] + [claim.stroke[1] - claim.stroke[0]]
     if min(positive) <= 0 or min(may_be_zero) < 0:
         return Fraction(-1)
     if claim.kind == "sampled":
         return Fraction(1)
-    return min(1 - initial / radius for initial, radius in zip(claim.initial, claim.radii, strict=True))
+    return min(1 - initial / radius for initial, radius in zip(claim.initial, claim.half_widths, strict=True))
 
 
 def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     """Decide every obligation of the law; with the closed loop, and the verdicts on it."""
-    Work.products, Work.allowed = 0, MAX_PRODUCTS
+    WORK.begin(MAX_PRODUCTS)
     made: list[Obligation] = []
 
     def state(name: str, statement: str, margin: Fraction, unit: str, remedy: str, strict: bool = True) -> None:
-        good = margin > 0 or (margin == 0 and not strict)
-        size = Fraction(10) ** 300
-        shown = float(max(-size, min(size, margin)))
-        made.append(Obligation(name, statement, shown, unit, "proved" if good else "undecided", "" if good else remedy))
+        made.append(decided(name, statement, margin, unit, remedy, member=claim.name, strict=strict))
 
     anew = "a certificate made for these gains and assumptions: run design again"
     statement = "the box is not empty, holds the initial errors, and no limit is zero"
@@ -1569,7 +1911,8 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     span = claim.reference[0]
     inside = min(span[0] - claim.stroke[0], claim.stroke[1] - span[1])
     statement = "the reference is continuous to its acceleration, ends at rest and stays inside the stroke"
-    state("reference", statement, inside, "m", f"waypoints {float(-inside):.3g} m further inside the stroke")
+    unit = str(claim.rows[0]["unit"])
+    state("reference", statement, inside, unit, f"waypoints {float(-inside):.3g} {unit} further inside the stroke")
     name, statement, spare = verdict.contraction()
     state(name, statement, spare, "1/s", anew, False)
     state("invariance", "no trajectory from the initial set leaves the assumed box", verdict.invariance(), "1", anew)
@@ -1585,12 +1928,12 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     wider = (step for step in (Fraction(1, 1000), Fraction(1, 10000)) if holds_within(claim, step))
     statement = "everything holds for the gains as decimal, float64 and float32"
     state("rounding", statement, next(wider, least), "1", "what the other obligations need")
-    error = verdict.ball(0)
-    statement = f"from {float(claim.transient):g} s on the tracking error is at most {float(error) * 1e3:.4g} mm"
-    needed = f"a requirement of {float(error) * 1.0001e3:.4g} mm"
-    state("accuracy", statement, claim.accuracy - error, "m", needed, False)
-    for i, stated in enumerate(claim.ball):
-        if stated < verdict.ball(i):
+    error = verdict.ultimate(0)
+    unit = str(claim.rows[0]["unit"])
+    statement = f"from {float(claim.transient):g} s on the tracking error is at most {milli(error, unit)}"
+    state("accuracy", statement, claim.accuracy - error, unit, f"a requirement of {milli(error, unit)}", False)
+    for i, stated in enumerate(claim.ultimate):
+        if stated < verdict.ultimate(i):
             raise NotProvedError(f"the envelope states a smaller bound on row {i + 1} than can be proved")
     return made, loop, verdict
 
@@ -1600,18 +1943,27 @@ def scale(claim: Claim, name: str) -> Fraction:
     return next((limit["value"] for limit in claim.limits if limit["name"] == name), claim.stroke[1] - claim.stroke[0])
 
 
-# --- golden vectors and recorded validation -----------------------------------------------------------------------
+def milli(bound: Fraction, unit: str) -> str:
+    """A bound in thousandths of its unit, four digits, rounded up."""
+    exponent = 0
+    size = bound * 1000
+    while size >= 10_000:
+        size, exponent = size / 10, exponent + 1
+    while 0 < size < 1_000:
+        size, exponent = size * 10, exponent - 1
+    return f"{float(-(-size // 1)) * 10.0**exponent:.4g} m{unit}"
 
 
-def golden_agree(data: dict[str, Any], claim: Claim) -> bool:
+# --- golden ---
+
+def golden_agree(vectors: Any, claim: Claim) -> bool:
     """The recorded input/output vectors follow from the gains and the law, to float accuracy."""
-    vectors = data["golden"]["vectors"]
     need(isinstance(vectors, list) and 20 <= len(vectors) <= 100, "golden must hold 20 to 100 vectors")
     return all(_golden_one(vector, claim) for vector in vectors)
 
 
 def _golden_one(vector: dict[str, Any], claim: Claim) -> bool:
-    n, k = len(claim.rows), len(claim.governed)
+    n, k = len(claim.rows), len(claim.controlled)
     x, r, theta = (
         [float(v) for v in numbers(vector[key], count, "golden")] for key, count in (("x", n), ("r", 4), ("theta", k))
     )
@@ -1622,7 +1974,7 @@ def _golden_one(vector: dict[str, Any], claim: Claim) -> bool:
     named |= {f"nominal.{name}": float(value) for name, value in zip(claim.feedforward, foreseen, strict=True)}
     virtual: dict[int, float] = {}
     following: list[float] = []
-    for j, i in enumerate(claim.governed):
+    for j, i in enumerate(claim.controlled):
         target = claim.rows[i]["target"]
         goal = r[0] if target == "reference" else 0.0 if target == "zero" else virtual[target]
         beta, epsilon, delta, sigma = (float(g) for g in claim.gains[j])
@@ -1631,7 +1983,7 @@ def _golden_one(vector: dict[str, Any], claim: Claim) -> bool:
         virtual[i] = -(beta + epsilon * theta[j]) * error / 2 + term
         step = epsilon * delta * error * error / 2 - delta * sigma * theta[j]
         following.append(theta[j] + float(claim.period) * step)
-    wanted = [virtual[row] for row in claim.drives]
+    wanted = [virtual[row] for row in claim.input_map]
     norm, limit = math.hypot(*wanted), float(claim.limits[0]["value"])
     wanted = [value * (limit / max(norm, limit)) for value in wanted]
     pairs = list(zip(wanted, numbers(vector["u"], len(wanted), "golden"), strict=True))
@@ -1647,324 +1999,264 @@ def float_apply(operator: str, a: float, b: float = 0.0) -> float:
     return a / b if operator == "div" else math.tanh(a) if operator == "tanh" else math.sqrt(a)
 
 
-# --- the command ---------------------------------------------------------------------------------------------------
-
+# --- member ---
 
 @dataclass(frozen=True)
-class Report:
-    """The verdict on one file."""
+class Member:
+    """A member of a machine with its verdicts, and the tube of position, speed, acceleration that it gives for all t.
 
-    file: str
-    status: int
-    message: str
-    obligations: list[Obligation] = field(default_factory=list)
-
-
-def check_text(text: str, file: str = "") -> Report:
-    """Re-prove a gain file given as text.
-
-    Returns:
-        Status 0 proved, 1 not proved, 2 unreadable; with one line and the obligations.
+    The tube is None where the certificate gives none.
     """
-    try:
-        data = parse(text)
-        need(data.get("schema") == SCHEMA, wrong_schema(data.get("schema")))
-        check_digests(text)
-        if data["certificate"]["kind"] == "network":
-            return check_machine(data, text, file)
-        return check_axis(data, file)[0]
-    except UnreadableError as error:
-        return Report(file, 2, f"unreadable: {error}")
-    except NotProvedError as error:
-        return Report(file, 1, f"not proved: {error}")
-    except (KeyError, TypeError, AttributeError, IndexError, ValueError, ZeroDivisionError, OverflowError) as error:
-        return Report(file, 2, f"unreadable: a part of the gain file is missing or malformed: {error!r:.120}")
-
-
-def check_axis(data: dict[str, Any], file: str) -> tuple[Report, Claim, Loop, Composed | Held]:
-    """Re-prove the file of one axis; with the claim, its closed loop and the verdicts on it."""
-    claim = read(data)
-    recorded = [entry["name"] for entry in data["obligations"] if entry["verdict"] == "proved"]
-    made, loop, verdict = obligations(claim)
-    agree = golden_agree(data, claim)
-    seen = number(data["validation"]["largest_error_m"], "largest_error_m")
-    need(seen >= 0, "largest_error_m must not be negative")
-    envelope = data["certificate"]["envelope"]
-    slower = number(envelope["rate"], "rate") <= claim.decay / (2 if claim.kind == "composition" else 1)
-    stated = numbers(envelope["initial"], len(claim.rows), "initial")
-    wider = all(a >= b for a, b in zip(stated, claim.initial, strict=True))
-    missing = [name for name in REQUIRED[data["controller"]["law"]][claim.kind] if recorded.count(name) != 1]
-    failed = [o for o in made if o.verdict != "proved"]
-    bound, settled = float(claim.ball[0]) * 1e3, float(claim.transient)
-    status, message = 0, f"proved: |tracking error| <= {bound:.4g} mm from {settled:g} s on"
-    if missing:
-        status, message = 1, f"not proved: the file leaves out the obligation {missing[0]}"
-    elif failed:
-        status, message = 1, f"not proved: {failed[0].name} (margin {failed[0].margin:.4g} {failed[0].unit})"
-    elif not (slower and wider):
-        status, message = 1, "not proved: the envelope states a faster rate or a smaller initial set"
-    elif not agree:
-        status, message = 1, "not proved: the golden vectors do not follow from the gains and the law"
-    elif seen > claim.radii[0]:
-        status, message = 1, "not proved: the recorded simulation leaves the certified envelope"
-    return Report(file, status, message, made), claim, loop, verdict
-
-
-# --- machines: joints that push each other ------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Joint:
-    """One joint of a machine: its proved claim, and the tube |z_1|, |z_2|, |z_2'| that its proof gives for all t."""
 
     name: str
     claim: Claim
     loop: Loop
-    reached: tuple[Fraction, Fraction, Fraction]
-    ball: Fraction
+    made: list[Obligation]
+    reached: tuple[Fraction, Fraction, Fraction] | None
+    ultimate: Fraction
+    failed: str
 
 
-def check_machine(data: dict[str, Any], text: str, file: str) -> Report:
-    """Re-prove the file of a machine: each joint by itself, then what the joints assume of each other."""
-    names = [entry["name"] for entry in data["controller"]["joints"]]
-    need(0 < len(names) <= MAX_JOINTS and len(set(names)) == len(names), f"a machine has 1 to {MAX_JOINTS} joints")
-    need(set(data["joints"]) == set(names), "the joints are not those of the controller")
-    for name in names:
-        need(NAME.fullmatch(name) is not None, "a joint's name must be a plain identifier")
-    for key in ("gains", "assumptions"):
-        count = sum(len(listed(data[key], name)) for name in names)
-        need(count == len(data[key]), f"the {key} list what no joint has")
-    plain, joints = json.loads(text), []
-    made: list[Obligation] = []
-    for name in names:
-        own = data["joints"][name]
-        need(own.get("schema") == SCHEMA, wrong_schema(own.get("schema")))
-        check_digests(json.dumps(plain["joints"][name]))
-        belongs(data, own, name)
-        report, claim, loop, verdict = check_axis(own, file)
-        made += [replace(o, name=f"{name}: {o.name}") for o in report.obligations]
-        if report.status:
-            return Report(file, 1, f"not proved: {name}: {report.message.removeprefix('not proved: ')}", made)
-        need(isinstance(verdict, Held) and len(claim.rows) > 1, "a joint of a machine needs a sampled certificate")
-        assert isinstance(verdict, Held)
-        joints.append(Joint(name, claim, loop, tube_of(claim, verdict), verdict.ball(0)))
-    Work.products, Work.allowed = 0, MAX_COUPLED
-    machine = Machine(data, joints)
-    made += machine.obligations()
-    recorded = [entry["name"] for entry in data["obligations"] if entry["verdict"] == "proved"]
-    for name in REQUIRED[data["controller"]["law"]]["network"]:
+def check_member(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Member:
+    """Re-prove one member under its own assumptions."""
+    claim = read(data, entry, coupled)
+    made, loop, verdict = obligations(claim)
+    agree = golden_agree(entry["golden"], claim)
+    seen = number(data["validation"]["members"][claim.name]["largest_error"], "largest_error")
+    need(seen >= 0, "largest_error must not be negative")
+    rate = number(entry["certificate"]["envelope"]["rate"], "rate")
+    failed = missing(data, REQUIRED[data["study"]["controller"]["law"]][claim.kind], claim.name)
+    wrong = [o for o in made if o.verdict != "proved"]
+    if not failed and wrong:
+        failed = f"{wrong[0].name} (margin {wrong[0].margin:.4g} {wrong[0].unit})"
+    elif not failed and not rate <= claim.decay / (2 if claim.kind == "composition" else 1):
+        failed = "the envelope states a faster rate"
+    elif not failed and not agree:
+        failed = "the golden vectors do not follow from the gains and the law"
+    elif not failed and seen > claim.half_widths[0]:
+        failed = "the recorded simulation leaves the certified envelope"
+    tube = tube_of(claim, verdict) if isinstance(verdict, Held) and len(claim.rows) > accelerating(claim) else None
+    return Member(claim.name, claim, loop, made, tube, verdict.ultimate(0), failed)
+
+
+def missing(data: dict[str, Any], required: Iterable[str], member: str) -> str:
+    """What to say of an obligation that the file does not record as proved, exactly once; empty where all are."""
+    recorded = [o["name"] for o in data["obligations"] if o["verdict"] == "proved" and o.get("member", "") == member]
+    for name in required:
         if recorded.count(name) != 1:
-            return Report(file, 1, f"not proved: the file leaves out the obligation {name}", made)
-    failed = [o for o in made if o.verdict != "proved"]
-    if failed:
-        return Report(file, 1, f"not proved: {failed[0].name} (margin {failed[0].margin:.4g} {failed[0].unit})", made)
-    seen = number(data["validation"]["largest_error_m"], "largest_error_m")
-    need(seen >= 0, "largest_error_m must not be negative")
-    if seen > machine.tool([joint.reached[0] for joint in joints]):
-        return Report(file, 1, "not proved: the recorded simulation leaves the certified envelope", made)
-    bound, settled = float(machine.stated) * 1e3, float(joints[0].claim.transient)
-    return Report(file, 0, f"proved: |tool error| <= {bound:.4g} mm from {settled:g} s on, all joints together", made)
+            return f"the file leaves out the obligation {name}"
+    return ""
 
 
 def tube_of(claim: Claim, verdict: Held) -> tuple[Fraction, Fraction, Fraction]:
-    """Bounds on |z_1|, |z_2| and |z_2'| for all t."""
-    speed = max(period.speeds(period.cell.start)[1] for period in verdict.periods)
-    return claim.radii[0], claim.radii[1], up(speed * claim.radii[1] / claim.period)
+    """Bounds on the deviations of position, speed and acceleration for all t; no position where a speed comes first."""
+    row = accelerating(claim)
+    rate = max(period.speeds(period.cell.start)[row] for period in verdict.periods)
+    position = claim.half_widths[0] if row else Fraction(0)
+    return position, claim.half_widths[row], up(rate * claim.half_widths[row] / claim.period)
 
 
-def belongs(data: dict[str, Any], own: dict[str, Any], name: str) -> None:
-    """Refuse a joint whose statement is not that of the machine's study and controller."""
-    study, part, controller = data["study"], own["study"], data["controller"]
-    same = [
-        (part["plant"], study["plant"]["axes"][name]),
-        (own["controller"]["law"], study["controller"]["law"]),
-        (own["controller"]["law"], controller["law"]),
-        (own["controller"]["rate_hz"], study["controller"]["rate_hz"]),
-        (own["controller"]["rate_hz"], controller["rate_hz"]),
-        (own["controller"]["period_s"], controller["period_s"]),
-        (own["controller"]["modelling"], study["controller"]["modelling"]),
-        (own["controller"]["modelling"], controller["modelling"]),
-        (part["controller"]["gains"], study["ranges"][name]),
-        (part["requirements"]["tracking_error_m"], study["requirements"]["joint_error"][name]),
-        (part["validation"]["transient_s"], study["validation"]["transient_s"]),
-        (own["reference"]["segments"], data["reference"]["joints"][name]["segments"]),
-    ]
-    same += [(prefixed(own[key], name), listed(data[key], name)) for key in ("gains", "assumptions")]
-    need(all(a == b for a, b in same), f"{name}: the statement is not the study's")
-    watched = study["controller"].get("observer") is not None
-    for k, row in enumerate(own["controller"]["subsystems"]):
-        key = ("position", "speed", "current_a")[min(k, 2)]
-        for kind in ("noise", "initial"):
-            wanted = number(study["uncertainty"][kind][key], key)
-            given = number(part["uncertainty"][kind][row["state"]], key)
-            measured = kind == "initial" or k > 1 or not watched  # else the obligation of the observer decides
-            need(not measured or given >= wanted, f"{name}: less {kind} {key} is assumed than the study states")
-    stated_drive(study["plant"], name)
+def accelerating(claim: Claim) -> int:
+    """The row whose state's rate is an acceleration."""
+    return 1 if claim.first == "position" else 0
 
 
-def prefixed(entries: list[dict[str, Any]], name: str) -> list[dict[str, Any]]:
-    """Entries of a joint as the machine lists them."""
-    return [{**entry, "name": f"{name}.{entry['name']}"} for entry in entries]
+# --- motion ---
+
+def cut(a: Interval, count: int) -> list[Interval]:
+    """Parts of an interval that cover it."""
+    ends = [a[0] + (a[1] - a[0]) * Fraction(k, count) for k in range(count + 1)]
+    return list(pairwise(ends))
 
 
-def listed(entries: list[dict[str, Any]], name: str) -> list[dict[str, Any]]:
-    """What a machine lists of one joint."""
-    return [entry for entry in entries if entry["name"].startswith(f"{name}.")]
+def motion_of(member: Member) -> None:
+    """Refuse a member whose first two states are not a position and its rate, or whose law does not know the rate.
+
+    Where a speed comes first nothing else is asked: its rate is what the plant says.
+    """
+    claim = member.claim
+    if claim.first == "speed":
+        return
+    operations, outputs = claim.plant["operations"], claim.plant["outputs"]
+    kinematic = operations[outputs[len(claim.rows)]] == ["input", claim.rows[1]["state"]]
+    need(kinematic and member.loop.mass[0] == ONE, f"{member.name}: the first state's rate is not the second state")
+    need(claim.rows[1]["target"] == 0, f"{member.name}: the second state does not follow the first")
+    term = claim.law[0]
+    rate = term["operations"][term["outputs"][0]] == ["input", "r1"]
+    need(rate, f"{member.name}: the first modelling term is not the reference's rate")
 
 
-def stated_drive(plant: dict[str, Any], name: str) -> None:
-    """Refuse resolved parameters that are milder than what the study says of an actuator."""
-    axis, own = plant["axes"][name], plant["joints"].get(name, {})
-    parameters, limits = axis["parameters"], {limit["name"]: limit["value"] for limit in axis["limits"]}
-    stated = {**plant["parameters"], **own.get("parameters", {})}
-    if plant["model"] == "arm":
-        stated["armature"] = own["armature"]
-        e = parameters["effectiveness"]
-        value, tolerance = number(e["value"], "effectiveness"), number(e["tolerance"], "effectiveness")
-        least, room = number(own["least_effectiveness"], "effectiveness"), Fraction(1, 10**12)
-        covered = value * (1 - tolerance) <= least + room and value * (1 + tolerance) >= 1 - room
-        need(covered, f"{name}: the actuator's effectiveness is not the study's")
-        damping = parameters["damping"]["value"]
-        need(damping == plant["damping"], f"{name}: the joint's damping is not the study's")
-        for key, limit in (("torque", own["torque"]["value"]), ("speed", own["speed_limit"])):
-            need(limits[key] == limit, f"{name}: the limit on {key} is not the study's")
-    for key, entry in stated.items():
-        same = parameters[key]["value"] == entry["value"]
-        given = entry.get("tolerance")
-        need(same and given in (None, parameters[key]["tolerance"]), f"{name}: {key} is not the study's")
+def slices(together: list[Any], halvings: Any) -> Iterable[list[list[Interval]]]:
+    """Ranges of position … jerk of every member over slices of time: pieces between knots, each halved some times."""
+    parts = 2 ** index(halvings, 9, "halvings")
+    need(len({len(segments) for segments in together}) == 1, "the references of the members have different segments")
+    count = 0
+    for segments in zip(*together, strict=True):
+        knots = [number(k, "a knot") for k in segments[0]["knots"]]
+        for segment in segments[1:]:
+            need(segment["knots"] == segments[0]["knots"], "the references of the members have different knots")
+        points = [[number(c, "a coefficient") for c in segment["coefficients"]] for segment in segments]
+        for span in range(5, len(knots) - 6):
+            low, high = knots[span], knots[span + 1]
+            if low == high:
+                continue
+            pieces = 1 if len(points[0]) == 6 else parts
+            for k in range(pieces):
+                ends = low + (high - low) * Fraction(k, pieces), low + (high - low) * Fraction(k + 1, pieces)
+                count += 1
+                need(count <= MAX_SLICES, f"the motion is cut into more than {MAX_SLICES} slices")
+                yield [ranges_on(knots, own, span, ends) for own in points]
 
 
-class Machine:
-    """What the joints do to each other over slices of time; see `docs/machine.md`.
+def ranges_on(
+    knots: list[Fraction], points: list[Fraction], span: int, ends: tuple[Fraction, Fraction]
+) -> list[Interval]:
+    """Hulls of the Bezier points of position … jerk of a spline on a part of a span, by blossoms (Ramshaw 1989)."""
+    degree = 5
+    curve = [
+        blossom(knots, points, span, [ends[0]] * (degree - k) + [ends[1]] * k) for k in range(degree + 1)
+    ]  # fmt: skip
+    found = []
+    for order in range(4):
+        found.append((down(min(curve)), up(max(curve))))
+        curve = [(degree - order) * (b - a) / (ends[1] - ends[0]) for a, b in pairwise(curve)]
+    return found
 
-    The load of joint i is ``w_i = F_i(x, v, a, payload) - m_i a_i``. On every slice it is foreseen along the reference,
-    and its deviation bounded by the mean value theorem while all joints keep their promised tubes.
+
+def blossom(knots: list[Fraction], points: list[Fraction], span: int, arguments: list[Fraction]) -> Fraction:
+    """The symmetric multi-affine form of a spline's piece."""
+    degree = len(arguments)
+    values = points[span - degree : span + 1]
+    for level, t in enumerate(arguments):
+        following = []
+        for j in range(degree - level):
+            first = knots[span - degree + level + 1 + j]
+            last = knots[span + 1 + j]
+            share = (t - first) / (last - first)
+            following.append(values[j] + share * (values[j + 1] - values[j]))
+        values = following
+    return values[0]
+
+
+# --- coupling ---
+
+class Coupling:
+    """What the members of a machine do to each other over slices of time; see `docs/machine.md`.
+
+    The load of member i is ``w_i = F_i(x, v, a, d) - m_i a_i`` with the machine's disturbances d. On every slice it is
+    foreseen along the reference at the middle of d, and its deviation bounded by the mean value theorem while all
+    members keep their tubes.
     """
 
-    def __init__(self, data: dict[str, Any], joints: list[Joint]) -> None:
-        self.joints, self.count = joints, len(joints)
-        certificate, controller = data["certificate"], data["controller"]
-        self.loads = valid_program(certificate["loads"], "the loads", turning=True)
-        self.place = valid_program(certificate["tool"], "the tool", turning=True)
-        inputs = [f"{letter}{j}" for letter in "xva" for j in range(self.count)]
-        need(len(self.loads["outputs"]) == self.count, "each joint needs a load")
-        need(reads(self.loads) <= {*inputs, "payload"}, "the loads read a name that no joint has")
-        need(reads(self.place) <= set(inputs[: self.count]), "the tool reads a name that no joint has")
-        self.own = [self._own(joint) for joint in joints]
-        low, high = numbers(data["study"]["uncertainty"]["payload_kg"], 2, "payload_kg")
-        need(0 <= low <= high, "the payload's range is upside down")
-        self.payload = (low, high)
-        self.foreseeing = "mechanics" in controller["modelling"]
-        for joint in joints:
-            need(bool(joint.claim.feedforward) == self.foreseeing, "what the joints foresee is not what the law models")
-            need(set(joint.claim.disturbances) == {"load_force"}, "a joint of a machine has one disturbance, its load")
-        self.promise = [tuple(numbers(certificate["promises"][j.name], 3, "a promise")) for j in joints]
-        self.stated = number(certificate["envelope"]["tool"], "the bound on the tool")
-        self.required = number(data["study"]["requirements"]["tool_error_m"], "tool_error_m")
-        self.slices = list(slices(data["reference"]["joints"], [j.name for j in joints], certificate["halvings"]))
-        self.observer = observer_of(data)
-        self.encoder = number(data["study"]["uncertainty"]["noise"]["position"], "the encoder's error")
-        self.slopes: list[list[Fraction]] = [[Fraction(0)] * self.count for _ in joints]
+    def __init__(self, data: dict[str, Any], entry: dict[str, Any], members: list[Member]) -> None:
+        self.members, self.count = members, len(members)
+        study = data["study"]
+        self.loads = valid_program(entry["loads"], "the loads", turning=True)
+        self.place = valid_program(entry["place"], "the output", turning=True)
+        self.signals = [
+            (f"{letter}{j}", j, order) for j, member in enumerate(members)
+            for order, letter in enumerate("xva" if member.claim.first == "position" else "va")
+        ]  # fmt: skip
+        inputs = [name for name, _, _ in self.signals]
+        self.disturbed = {
+            name: tuple(numbers(given["range"], 2, name))
+            for name, given in study["uncertainty"]["disturbances"].items()
+        }  # fmt: skip
+        for name, (low, high) in self.disturbed.items():
+            need(NAME.fullmatch(name) is not None and name not in inputs, "a disturbance needs a name of its own")
+            need(low <= high, f"the range of {name} is upside down")
+        need(len(self.loads["outputs"]) == self.count, "each member needs a load")
+        need(reads(self.loads) <= {*inputs, *self.disturbed}, "the loads read a name that no member has")
+        unread = set(self.disturbed) - reads(self.loads)
+        need(not unread, f"the loads do not use {', '.join(sorted(unread))}, which the study states")
+        places = {name for name in inputs if name[0] == "x"}
+        need(reads(self.place) <= places, "the output reads a name that no member has")
+        self.own = [self._own(member) for member in members]
+        self.foreseeing = "mechanics" in study["controller"]["modelling"]
+        for member in members:
+            claim = member.claim
+            need(bool(claim.feedforward) == self.foreseeing, "what the members foresee is not what the law models")
+            need(len(claim.disturbances) == 1, "a member of a coupling has one disturbance, its load")
+        self.load = [next(iter(member.claim.disturbances)) for member in members]
+        self.guarantee = [guarantee_of(data, member.name) for member in members]
+        self.stated = number(entry["envelope"]["output"], "the bound on the output")
+        self.required = number(study["requirements"]["tracking_error_m"], "tracking_error_m")
+        named = {m["name"]: m["reference"]["segments"] for m in data["members"]}
+        self.slices = list(slices([named[m.name] for m in members], entry["halvings"]))
+        self.slopes: list[list[Fraction]] = [[Fraction(0)] * self.count for _ in members]
 
-    def _own(self, joint: Joint) -> Fraction:
-        """The inertia of the bodies that a joint's own model carries."""
-        names = [name for name in OWN if name in joint.claim.parameters]
-        self._motion(joint)
-        need(len(names) == 1, f"{joint.name}: the plant must carry a part of the machine's inertia")
-        low, high = joint.claim.parameters[names[0]]
-        # parameters are widened by a billionth of a billionth where they have a tolerance; this one has none
-        need(low == high, f"{joint.name}: its part of the machine's inertia must be a number")
+    def _own(self, member: Member) -> Fraction:
+        """The inertia of the bodies that a member's own model carries."""
+        names = [name for name in CARRIED if name in member.claim.parameters]
+        motion_of(member)
+        need(len(names) == 1, f"{member.name}: the plant must carry a part of the machine's inertia")
+        low, high = member.claim.parameters[names[0]]
+        need(low == high, f"{member.name}: its part of the machine's inertia must be a number")
         return low
 
-    def _motion(self, joint: Joint) -> None:
-        """The first two states must be a position and its rate, and the first virtual control the reference's."""
-        claim = joint.claim
-        operations, outputs = claim.plant["operations"], claim.plant["outputs"]
-        kinematic = operations[outputs[len(claim.rows)]] == ["input", claim.rows[1]["state"]]
-        need(kinematic and joint.loop.mass[0] == ONE, f"{joint.name}: the first state's rate is not the second state")
-        need(claim.rows[1]["target"] == 0, f"{joint.name}: the second state does not follow the first")
-        term = claim.law[0]
-        rate = term["operations"][term["outputs"][0]] == ["input", "r1"]
-        need(rate, f"{joint.name}: the first modelling term is not the reference's rate")
-
     def obligations(self) -> list[Obligation]:
-        """Decide what joins the joints."""
-        made: list[Obligation] = []
-
-        def state(name: str, statement: str, margin: Fraction, unit: str, remedy: str) -> None:
-            verdict = "proved" if margin > 0 else "undecided"
-            made.append(Obligation(name, statement, float(margin), unit, verdict, "" if margin > 0 else remedy))
-
-        state("joints", f"{self.count} joints, each proved under its own assumptions", Fraction(1), "1", "")
-        statement = "the references of all joints share their knots and stay inside the strokes"
-        state("motion", statement, Fraction(len(self.slices)), "slices", "references of one duration")
-        kept = [
-            1 - got / said for joint, told in zip(self.joints, self.promise, strict=True)
-            for got, said in zip(joint.reached, told, strict=True) if said > 0
-        ]  # fmt: skip
-        told = len(kept) == 3 * self.count
-        statement = "each joint keeps its promise on position, speed and acceleration"
-        state("promises", statement, min(kept) if told else Fraction(-1), "1", "a certificate made for these gains")
+        """Decide what joins the members."""
+        made = []
+        statement = f"the references of all {self.count} members share their knots"
+        made.append(decided("motion", statement, Fraction(len(self.slices)), "slices", "references of one duration"))
         worst, which = self._loads()
-        statement = f"what the joints do to each other is inside what each was proved under; the tightest is {which}"
-        state("loads", statement, worst, "1", "smaller promises, or gains that are proved under more load")
-        spare = self._well_posed()
-        statement = "inside the promises the accelerations follow from the loads in one way: the coupling contracts"
-        state("coupling", statement, spare, "1", "less coupling between the joints, or more inertia of the actuators")
-        spare, statement = self._observed()
-        state("observer", statement, spare, "1", "an observer that is faster, or a better encoder")
-        bound = self.tool([joint.ball for joint in self.joints])
+        statement = f"what the members do to each other is inside what each was proved under; the tightest is {which}"
+        remedy = "smaller guarantees, or gains that are proved under more load"
+        made.append(decided("loads", statement, worst, "1", remedy))
+        statement = "inside the guarantees the accelerations follow from the loads in one way: the coupling contracts"
+        remedy = "less coupling between the members, or more inertia of the actuators"
+        made.append(decided("coupling", statement, self._well_posed(), "1", remedy))
+        bound = self.output([member.ultimate for member in self.members])
         if self.stated < bound:
-            raise NotProvedError("the envelope states a smaller bound on the tool than can be proved")
-        settled = float(self.joints[0].claim.transient)
-        statement = f"from {settled:g} s on the tool is within {float(bound) * 1e3:.4g} mm of its reference"
-        needed = f"a requirement of {float(bound) * 1.0001e3:.4g} mm"
-        state("tool", statement, self.required - bound, "m", needed)
+            raise NotProvedError("the envelope states a smaller bound on the output than can be proved")
+        settled = float(self.members[0].claim.transient)
+        statement = f"from {settled:g} s on the output is within {milli(bound, 'm')} of its reference"
+        made.append(decided("output", statement, self.required - bound, "m", f"a requirement of {milli(bound, 'm')}"))
         return made
 
-    def _ranges(self, part: list[list[Interval]], radii: list[tuple[Fraction, ...]]) -> dict[str, Interval]:
+    def _ranges(self, part: list[list[Interval]], half_widths: list[tuple[Fraction, ...]]) -> dict[str, Interval]:
         return {
-            f"{letter}{j}": add(part[j][order], symmetric(radii[j][order]))
-            for order, letter in enumerate("xva") for j in range(self.count)
-        }  # fmt: skip
+            name: add(part[j][order], symmetric(half_widths[j]["xva".index(name[0])]))
+            for name, j, order in self.signals
+        }
 
     def _loads(self) -> tuple[Fraction, str]:
         """The smallest spare of what the joints assume of their loads, relative to its size; and where."""
         nothing = [(Fraction(0),) * 3] * self.count
-        middle = (self.payload[0] + self.payload[1]) / 2
-        half = (self.payload[1] - self.payload[0]) / 2
+        middle: dict[str, Interval] = {
+            name: ((low + high) / 2, (low + high) / 2) for name, (low, high) in self.disturbed.items()
+        }
+        half = {name: (high - low) / 2 for name, (low, high) in self.disturbed.items()}
         spare: list[tuple[Fraction, str]] = []
         for part in self.slices:
-            along = {
-                f"{letter}{j}": {"": part[j][order]}
-                for order, letter in enumerate("xva", 1) for j in range(self.count)
-            }  # fmt: skip
-            at_reference = {**self._ranges(part, nothing), "payload": (middle, middle)}
-            foreseen = derivatives(self.loads, at_reference, along)
-            around = {**self._ranges(part, self.promise), "payload": self.payload}
-            moved = derivatives(self.loads, around, {name: {name: ONE} for name in around})
-            for i, joint in enumerate(self.joints):
+            along = {name: {"t": part[j][order + 1]} for name, j, order in self.signals}
+            foreseen = slopes(self.loads, {**self._ranges(part, nothing), **middle}, along)
+            around = {**self._ranges(part, self.guarantee), **self.disturbed}
+            moved = slopes(self.loads, around, {name: {name: ONE} for name in around})
+            for i, member in enumerate(self.members):
                 size, along_own = Fraction(0), f"a{i}"
                 for name, slope in {along_own: ZERO, **moved[i][1]}.items():
-                    if name == "payload":
-                        size = up(size + magnitude(slope) * half)
+                    if name in half:
+                        size = up(size + magnitude(slope) * half[name])
                         continue
                     j = int(name[1:])
                     if name == along_own:
                         slope = add(slope, neg((self.own[i], self.own[i])))
                     if name[0] == "a":
                         self.slopes[i][j] = max(self.slopes[i][j], magnitude(slope))
-                    size = up(size + magnitude(slope) * self.promise[j]["xva".index(name[0])])
+                    size = up(size + magnitude(slope) * self.guarantee[j]["xva".index(name[0])])
                 own = (self.own[i], self.own[i])
-                load = add(foreseen[i][0], neg(mul(own, part[i][2])))
-                rate = add(foreseen[i][1].get("", ZERO), neg(mul(own, part[i][3])))
-                spare.append((self._inside(joint.claim, load, rate, size), joint.name))
+                order = 1 + accelerating(member.claim)
+                load = add(foreseen[i][0], neg(mul(own, part[i][order])))
+                rate = add(foreseen[i][1].get("t", ZERO), neg(mul(own, part[i][order + 1])))
+                spare.append((self._inside(i, load, rate, size), member.name))
         return min(spare)
 
-    def _inside(self, claim: Claim, load: Interval, rate: Interval, size: Fraction) -> Fraction:
-        """How much room the assumptions of a joint leave to its load on a slice."""
-        assumed = claim.disturbances["load_force"]
-        known = claim.feedforward.get("load_force")
+    def _inside(self, i: int, load: Interval, rate: Interval, size: Fraction) -> Fraction:
+        """How much room the assumptions of a member leave to its load on a slice."""
+        claim = self.members[i].claim
+        assumed = claim.disturbances[self.load[i]]
+        known = claim.feedforward.get(self.load[i])
         if known is not None:
             foreseen = all(o[0] <= a[0] and a[1] <= o[1] for a, o in ((load, known[0]), (rate, known[1])))
             foreseen = foreseen and known[1][0] <= 0 <= known[1][1]  # after its end the reference rests
@@ -1974,8 +2266,8 @@ class Machine:
 
     def _well_posed(self) -> Fraction:
         """1 - max N s / s for N_ij = sup|dw_i/da_j| sup|da_j/dw_j|: positive where the map of the loads contracts."""
-        slopes = [self._answer(joint) for joint in self.joints]
-        matrix = [[v * slopes[j] for j, v in enumerate(row)] for row in self.slopes]
+        answers = [self._answer(i) for i in range(self.count)]
+        matrix = [[v * answers[j] for j, v in enumerate(row)] for row in self.slopes]
         shape = [Fraction(1)] * self.count
         for _ in range(60):
             shape = [down(dot(row, shape) + Fraction(1, 10**6)) for row in matrix]
@@ -1983,67 +2275,62 @@ class Machine:
             shape = [down(v / largest) + Fraction(1, 10**9) for v in shape]
         return 1 - max(dot(row, shape) / own for row, own in zip(matrix, shape, strict=True))
 
-    def _answer(self, joint: Joint) -> Fraction:
-        """How much the acceleration of a joint moves with its load, at most."""
-        claim, loop = joint.claim, joint.loop
-        program = {**claim.plant, "outputs": [claim.plant["outputs"][len(claim.rows) + 1]]}
-        ranges = {name: node.range for name, node in loop.nodes.items()}
-        rate, worst, least, most = claim.rows[1]["state"], Fraction(0), -Fraction(10**9), Fraction(10**9)
+    def _answer(self, i: int) -> Fraction:
+        """How much the acceleration of a member moves with its load, at most."""
+        member, name = self.members[i], self.load[i]
+        claim, loop = member.claim, member.loop
+        row = accelerating(claim)
+        program = {**claim.plant, "outputs": [claim.plant["outputs"][len(claim.rows) + row]]}
+        ranges = {key: node.range for key, node in loop.nodes.items()}
+        rate, worst, least, most = claim.rows[row]["state"], Fraction(0), -Fraction(10**9), Fraction(10**9)
         # friction that changes sides with power makes the slope depend on speed and load: small parts of both
-        for speed, load in product(cut(ranges[rate], SPEED_PARTS), cut(ranges["load_force"], LOAD_PARTS)):
-            here = {**ranges, rate: speed, "load_force": load}
-            slope = derivative(program, here, {"load_force": {"": ONE}}).get("", ZERO)
+        for speed, load in product(cut(ranges[rate], SPEED_PARTS), cut(ranges[name], LOAD_PARTS)):
+            found = slopes(program, {**ranges, rate: speed, name: load}, {name: {"w": ONE}})
+            slope = found[0][1].get("w", ZERO)
             worst, least, most = max(worst, magnitude(slope)), max(least, slope[1]), min(most, slope[0])
-        inertia = {**claim.plant, "outputs": [claim.plant["outputs"][1]]}
-        name = next(name for name in OWN if name in claim.parameters)
-        weight = derivative(inertia, ranges, {name: {"": ONE}}).get("", ZERO)
-        need(weight[0] > 0, f"{joint.name}: the plant does not carry its part of the machine's inertia")
+        inertia = {**claim.plant, "outputs": [claim.plant["outputs"][row]]}
+        carried = next(key for key in CARRIED if key in claim.parameters)
+        weight = derivative(inertia, ranges, {carried: {"": ONE}}).get("", ZERO)
+        need(weight[0] > 0, f"{member.name}: the plant does not carry its part of the machine's inertia")
         # what a load does without friction is what the own part of the inertia does: -dh/dw = dM/dm
         matches = most <= -weight[0] and -weight[1] <= least
-        need(matches, f"{joint.name}: the load does not enter the plant as its part of the machine's inertia does")
-        return up(worst / loop.mass[1][0])
+        need(matches, f"{member.name}: the load does not enter the plant as its part of the machine's inertia does")
+        return up(worst / loop.mass[row][0])
 
-    def _observed(self) -> tuple[Fraction, str]:
-        """How much room the assumed measurement errors leave to the errors of the observers."""
-        if self.observer is None:
-            spare = [self._share(joint.claim.noise[0], self.encoder) for joint in self.joints]
-            return min(spare), "there is no observer: position and speed are measured"
-        found = []
-        for joint in self.joints:
-            claim = joint.claim
-            jerk = magnitude(claim.reference[3])
-            told = self.promise[self.joints.index(joint)]
-            # |v(0) - r'(0)| where |Q_2(0)| and |Q_1(0)| are bounded
-            start = claim.initial[1] + joint.loop.gain[0].beta[1] / 2 * claim.initial[0]
-            position, speed = self.observer.errors(self.encoder, told[2] + claim.period * jerk, start)
-            need(self.observer.period == claim.period, "the observer's period is not that of the law")
-            found += [self._share(claim.noise[0], position), self._share(claim.noise[1], speed)]
-        return min(found), "the errors of every observer are inside the assumed measurement errors"
-
-    def _share(self, assumed: Fraction, error: Fraction) -> Fraction:
-        """Room relative to what is assumed; where both are the same number there is room enough."""
-        if assumed < error:
-            return -Fraction(1)
-        return (assumed - error) / assumed + Fraction(1, 10**12) if assumed > 0 else Fraction(1)
-
-    def tool(self, radii: list[Fraction]) -> Fraction:
-        """Bound on the distance of the tool from its reference while |x_i - r_i| <= radii_i."""
+    def output(self, half_widths: list[Fraction]) -> Fraction:
+        """Bound on the distance of the output from its reference while |x_i - r_i| <= half_widths_i."""
         worst = Fraction(0)
         for part in self.slices:
-            ranges = {f"x{j}": add(part[j][0], symmetric(radius)) for j, radius in enumerate(radii)}
-            moved = derivatives(self.place, ranges, {name: {name: ONE} for name in ranges})
+            ranges = {f"x{j}": add(part[j][0], symmetric(radius)) for j, radius in enumerate(half_widths)
+                      if self.members[j].claim.first == "position"}  # fmt: skip
+            moved = slopes(self.place, ranges, {name: {name: ONE} for name in ranges})
             sizes = [
-                sum((magnitude(v) * radii[int(name[1:])] for name, v in form.items()), ZERO[0]) for _, form in moved
+                sum((magnitude(v) * half_widths[int(name[1:])] for name, v in along.items()), ZERO[0])
+                for _, along in moved
             ]
             worst = max(worst, up(sum((size * size for size in sizes), ZERO[0])))
         return root(worst, True)
 
 
-def cut(a: Interval, count: int) -> list[Interval]:
-    """Parts of an interval that cover it."""
-    ends = [a[0] + (a[1] - a[0]) * Fraction(k, count) for k in range(count + 1)]
-    return list(pairwise(ends))
+def guarantee_of(data: dict[str, Any], name: str) -> tuple[Fraction, ...]:
+    """The tube that a member guarantees for all t."""
+    entry = next(m for m in data["members"] if m["name"] == name)
+    return tuple(numbers(entry["certificate"]["guarantee"], 3, "a guarantee"))
 
+
+def guarantees_kept(data: dict[str, Any], members: list[Member]) -> Obligation:
+    """Each member's proof reaches no more than it guarantees."""
+    kept = []
+    for member in members:
+        need(member.reached is not None, f"{member.name}: a guarantee needs a sampled certificate")
+        told = guarantee_of(data, member.name)
+        pairs = list(zip(member.reached or (), told, strict=True))[0 if member.claim.first == "position" else 1 :]
+        kept += [1 - got / said if said > 0 else Fraction(-1) for got, said in pairs]
+    statement = "each member keeps what it guarantees of position, speed and acceleration"
+    return decided("guarantees", statement, min(kept), "1", "a certificate made for these gains")
+
+
+# --- observer ---
 
 @dataclass(frozen=True)
 class Observer:
@@ -2082,74 +2369,113 @@ class Observer:
         return reach[0], up(reach[1] + abs(k) * reach[0])
 
 
-def observer_of(data: dict[str, Any]) -> Observer | None:
-    """The observer of the file, or None."""
-    section, study = data["controller"].get("observer"), data["study"]["controller"].get("observer")
-    need((section is None) == (study is None), "the observer is not the study's")
-    if section is None:
-        return None
-    first, second, largest, period, pole = (
-        number(section[key], f"the observer's {key}") for key in ("first", "second", "largest", "period_s", "pole")
-    )
-    need(first > 0 and second > 0 and largest >= 0 and period > 0, "the observer's gains must be positive")
-    for key in ("largest", "epsilon", "sigma"):
-        need(number(section[key], key) == number(study[key], key), f"the observer's {key} is not the study's")
-    rate = number(data["controller"]["rate_hz"], "rate_hz")
-    need(abs(period * rate - 1) < Fraction(1, 10**12), "the observer's period is not 1 / rate_hz")
-    return Observer(first, second, largest, 1 / rate, pole)
+def observer_of(data: dict[str, Any], member: Member) -> Observer:
+    """The observer of a member: what it is from the study, its gains and the coordinates of its proof from the file."""
+    section = next(m for m in data["members"] if m["name"] == member.name)["observer"]
+    first, second, pole = (number(section[key], f"the observer's {key}") for key in ("first", "second", "pole"))
+    largest = number(data["study"]["controller"]["observer"]["largest"], "the observer's largest")
+    need(first > 0 and second > 0 and largest >= 0, "the observer's gains must be positive")
+    return Observer(first, second, largest, member.claim.period, pole)
 
 
-def slices(references: dict[str, Any], names: list[str], halvings: Any) -> Iterable[list[list[Interval]]]:
-    """Ranges of position … jerk of every joint over slices of time: pieces between knots, each halved some times."""
-    parts = 2 ** index(halvings, 9, "halvings")
-    together = [references[name]["segments"] for name in names]
-    need(len({len(segments) for segments in together}) == 1, "the references of the joints have different segments")
-    count = 0
-    for segments in zip(*together, strict=True):
-        knots = [number(k, "a knot") for k in segments[0]["knots"]]
-        for segment in segments[1:]:
-            need(segment["knots"] == segments[0]["knots"], "the references of the joints have different knots")
-        points = [[number(c, "a coefficient") for c in segment["coefficients"]] for segment in segments]
-        for span in range(5, len(knots) - 6):
-            low, high = knots[span], knots[span + 1]
-            if low == high:
-                continue
-            cut = 1 if len(points[0]) == 6 else parts
-            for k in range(cut):
-                ends = low + (high - low) * Fraction(k, cut), low + (high - low) * Fraction(k + 1, cut)
-                count += 1
-                need(count <= MAX_SLICES, f"the motion is cut into more than {MAX_SLICES} slices")
-                yield [ranges_on(knots, own, span, ends) for own in points]
-
-
-def ranges_on(
-    knots: list[Fraction], points: list[Fraction], span: int, ends: tuple[Fraction, Fraction]
-) -> list[Interval]:
-    """Hulls of the Bezier points of position … jerk of a spline on a part of a span, by blossoms (Ramshaw 1989)."""
-    degree = 5
-    curve = [
-        blossom(knots, points, span, [ends[0]] * (degree - k) + [ends[1]] * k) for k in range(degree + 1)
-    ]  # fmt: skip
+def observed(data: dict[str, Any], members: list[Member]) -> Obligation:
+    """The assumed measurement errors have room for the errors of the observers."""
     found = []
-    for order in range(4):
-        found.append((down(min(curve)), up(max(curve))))
-        curve = [(degree - order) * (b - a) / (ends[1] - ends[0]) for a, b in pairwise(curve)]
-    return found
+    noise = data["study"]["uncertainty"].get("noise", {})
+    for member in members:
+        claim = member.claim
+        encoder = number(noise.get(claim.rows[0]["state"], Fraction(0)), "the encoder's error")
+        motion_of(member)
+        need(claim.first == "position", "an observer estimates a position and its rate")
+        acceleration = guarantee_of(data, member.name)[2] + claim.period * magnitude(claim.reference[3])
+        # |v(0) - r'(0)| where |Q_2(0)| and |Q_1(0)| are bounded
+        start = claim.initial[1] + member.loop.gain[0].beta[1] / 2 * claim.initial[0]
+        position, speed = observer_of(data, member).errors(encoder, acceleration, start)
+        found += [room_for(claim.noise[0], position), room_for(claim.noise[1], speed)]
+    statement = "the errors of every observer are inside the assumed measurement errors"
+    return decided("observer", statement, min(found), "1", "an observer that is faster, or a better encoder")
 
 
-def blossom(knots: list[Fraction], points: list[Fraction], span: int, arguments: list[Fraction]) -> Fraction:
-    """The symmetric multi-affine form of a spline's piece."""
-    degree = len(arguments)
-    values = points[span - degree : span + 1]
-    for level, t in enumerate(arguments):
-        following = []
-        for j in range(degree - level):
-            first = knots[span - degree + level + 1 + j]
-            last = knots[span + 1 + j]
-            share = (t - first) / (last - first)
-            following.append(values[j] + share * (values[j + 1] - values[j]))
-        values = following
-    return values[0]
+def room_for(assumed: Fraction, error: Fraction) -> Fraction:
+    """Room relative to what is assumed; where both are the same number there is room enough."""
+    if assumed < error:
+        return -Fraction(1)
+    return (assumed - error) / assumed + Fraction(1, 10**12) if assumed > 0 else Fraction(1)
+
+
+# --- command ---
+
+def check_text(text: str, file: str = "") -> Report:
+    """Re-prove a gain file given as text.
+
+    Returns:
+        Status 0 proved, 1 not proved, 2 unreadable; with one line and the obligations.
+    """
+    try:
+        data = parse(text)
+        need(data.get("schema") == SCHEMA, wrong_schema(data.get("schema")))
+        check_digests(text)
+        return check_machine(data, file)
+    except UnreadableError as error:
+        return Report(file, 2, f"unreadable: {error}")
+    except NotProvedError as error:
+        return Report(file, 1, f"not proved: {error}")
+    except (KeyError, TypeError, AttributeError, IndexError, ValueError, ZeroDivisionError, OverflowError) as error:
+        return Report(file, 2, f"unreadable: a part of the gain file is missing or malformed: {error!r:.120}")
+
+
+def check_machine(data: dict[str, Any], file: str) -> Report:
+    """Re-prove each member by itself, then what the members assume of each other."""
+    names = [entry["name"] for entry in data["members"]]
+    need(0 < len(names) <= MAX_MEMBERS and len(set(names)) == len(names), f"a machine has 1 to {MAX_MEMBERS} members")
+    need(all(isinstance(name, str) and NAME.fullmatch(name) for name in names), "a member's name must be an identifier")
+    need(set(names) == set(data["study"]["plant"]["joints"]), "the members are not those of the study")
+    couplings = data["couplings"]
+    need(isinstance(couplings, list) and len(couplings) <= 1, "a machine has one coupling, or none")
+    need(all(entry["members"] == names for entry in couplings), "a coupling is of all members in their order")
+    need(len(names) == 1 or bool(couplings), "members without a coupling are files of their own")
+    made: list[Obligation] = []
+    members = []
+    for entry in data["members"]:
+        member = check_member(data, entry, bool(couplings))
+        made += member.made
+        if member.failed:
+            where = f"{member.name}: " if len(names) > 1 else ""
+            return Report(file, 1, f"not proved: {where}{member.failed}", made)
+        members.append(member)
+    return check_together(data, members, made, file)
+
+
+def check_together(data: dict[str, Any], members: list[Member], made: list[Obligation], file: str) -> Report:
+    """What joins the members: guarantees, coupling, observers; and the bound on the output."""
+    WORK.begin(MAX_COUPLED)
+    observing = data["study"]["controller"].get("observer") is not None
+    required = [*(COUPLED if data["couplings"] else ()), *(OBSERVED if observing else ())]
+    if required:
+        made.append(guarantees_kept(data, members))
+    coupling = Coupling(data, data["couplings"][0], members) if data["couplings"] else None
+    made += coupling.obligations() if coupling is not None else []
+    made += [observed(data, members)] if observing else []
+    failed = missing(data, dict.fromkeys(required), "")
+    wrong = [o for o in made if o.verdict != "proved"]
+    if failed or wrong:
+        return Report(
+            file, 1, f"not proved: {failed or f'{wrong[0].name} (margin {wrong[0].margin:.4g} {wrong[0].unit})'}", made
+        )
+    settled = float(members[0].claim.transient)
+    if coupling is None:
+        claim = members[0].claim
+        bound = milli(claim.ultimate[0], str(claim.rows[0]["unit"]))
+        return Report(file, 0, f"proved: |tracking error| <= {bound} from {settled:g} s on", made)
+    seen = number(data["validation"]["largest_error_m"], "largest_error_m")
+    need(seen >= 0, "largest_error_m must not be negative")
+    if seen > coupling.output([member.claim.half_widths[0] for member in members]):
+        return Report(file, 1, "not proved: the recorded simulation leaves the certified envelope", made)
+    bound = milli(coupling.stated, "m")
+    message = (
+        f"proved: |tracking error of the output| <= {bound} from {settled:g} s on, all {len(members)} members together"
+    )
+    return Report(file, 0, message, made)
 
 
 def check_file(path: Path) -> Report:
@@ -2173,6 +2499,11 @@ def main(arguments: list[str] | None = None) -> int:
     return max(report.status for report in reports)
 
 
+def several(report: Report) -> bool:
+    """Whether a report is of more than one member."""
+    return len({o.member for o in report.obligations if o.member}) > 1
+
+
 def show(reports: list[Report], *, as_json: bool) -> None:
     """Print the verdicts."""
     if as_json:
@@ -2182,7 +2513,8 @@ def show(reports: list[Report], *, as_json: bool) -> None:
         for report in reports:
             print(f"{report.file}: {report.message}")
             for o in report.obligations:
-                print(f"  {o.verdict:9} {o.name:12} margin {o.margin:.4g} {o.unit}: {o.statement}")
+                name = f"{o.member}: {o.name}" if several(report) and o.member else o.name
+                print(f"  {o.verdict:9} {name:12} margin {o.margin:.4g} {o.unit}: {o.statement}")
                 if o.remedy:
                     print(f"            would pass: {o.remedy}")
 

@@ -6,9 +6,12 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from hdmm_opt import gain_file
-from hdmm_opt.problem import assemble, study_of
-from stability import Composition, Gains, certify
+from hdmm_opt.files.gain_file import build
+from hdmm_opt.files.restore import restored
+from hdmm_opt.files.seal import prove, seal, to_text
+from hdmm_opt.simulation import Loop
+from stability import Composition, certify
+from stability.networks.contracts import Contract
 
 # Timing is no property of the code, and a seed that changes is no test.
 settings.register_profile("project", deadline=None, derandomize=True)
@@ -37,16 +40,15 @@ def document(gain_text: str) -> dict:
 def composed_text(gain_text: str) -> str:
     """A file of emla-p2 whose certificate is a composition, at gains that leave it room."""
     document = json.loads(gain_text)
-    problem = assemble(study_of(document["study"]))
-    gains = (
-        Gains(beta=24.35, epsilon=1.045, delta=0.4057, sigma=36.09),
-        Gains(beta=7188.0, epsilon=7.155, sigma=39.69),
-    )
-    found = certify(problem.model, problem.bounds, gains, problem.box)
+    problem, _ = restored(document)
+    (member,) = problem.members
+    values = (24.35, 1.045, 0.4057, 36.09, 7188.0, 7.155, 1.0, 39.69)
+    found = certify(member.model, member.bounds, member.gains(values), member.box)
     assert isinstance(found, Composition)
-    text, report = gain_file.prove(gain_file.build(problem, gains, found, document["validation"], {}))
+    contracts = {"actuator": Contract(guarantee=None, reached=None, bounds=member.bounds, certificate=found)}
+    text, report = prove(build(Loop(problem), {"actuator": values}, contracts, document["validation"]))
     assert report.status == 0
-    return gain_file.to_text(text)
+    return to_text(text)
 
 
 @pytest.fixture
@@ -58,4 +60,4 @@ def composed(composed_text: str) -> dict:
 @pytest.fixture(scope="session")
 def resealed():
     """Text of a changed document with its hashes made right again, as a careful forger would."""
-    return lambda data: gain_file.to_text(gain_file.seal(data))
+    return lambda data: to_text(seal(data))

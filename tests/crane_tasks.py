@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from hdmm_opt.crane_task import crane_cost, crane_task, joint_limits, tool_function
+from hdmm_opt.machines.crane_limits import joint_limits
+from hdmm_opt.motions.crane_task import crane_cost, crane_task, tool_function
 from trajectories import Waypoint
 from trajectories.diagnosis import at_rest
 from trajectories.obstacle import Ball, HalfSpace
@@ -25,7 +26,7 @@ def random_task(seed):
     """Point to point, by way of a place, to a place of the tool, past a ball, or with a cost beside time."""
     random = np.random.default_rng(seed)
     payload = float(random.choice(PAYLOADS))
-    kind = ("plain", "via", "tool", "ball", "cost")[seed % 5]
+    kind = ("plain", "via", "tool", "ultimate", "cost")[seed % 5]
     start, goal = place(random, payload), place(random, payload)
     given = {"payload": payload}
     if kind == "via":
@@ -33,7 +34,7 @@ def random_task(seed):
     if kind == "tool":
         there = np.array(tool_function()(goal)).ravel()
         return crane_task([start, Waypoint(value=there, through=tool_function(), near=goal)], **given)
-    if kind == "ball":
+    if kind == "ultimate":
         ends = [np.array(tool_function()(w)).ravel() for w in (start, goal)]
         middle = np.array(tool_function()((start + goal) / 2)).ravel() + random.normal(0, 0.2, 2)
         radius = min(0.35, 0.7 * min(np.hypot(*(middle - end)) for end in ends))

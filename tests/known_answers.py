@@ -48,9 +48,9 @@ def integrator_chain(order: int, *, unit: float = 1.0) -> LoopModel:
     y = ca.SX.sym("y", order + 1)
     term = from_casadi(ca.Function("term", [y], [ca.SX(0)]), (*states, "r1"))
     rows = tuple(
-        Row(state=s, unit="m", target="reference" if i == 0 else i - 1, governed=True) for i, s in enumerate(states)
+        Row(state=s, unit="m", target="reference" if i == 0 else i - 1, controlled=True) for i, s in enumerate(states)
     )
-    return LoopModel(rows=rows, drives=(order - 1,), inputs=("u",), plant=plant, law=(term,) * order)
+    return LoopModel(rows=rows, input_map=(order - 1,), inputs=("u",), plant=plant, law=(term,) * order)
 
 
 def chain_bounds(
@@ -108,10 +108,11 @@ def claim_of(
 
     composed = isinstance(found, Composition)
     sampled = found if isinstance(found, Sampled) else None
-    smallest = 1e-6 * found.radii[-1] * gains[-1].beta if composed else 0.0
+    smallest = 1e-6 * found.half_widths[-1] * gains[-1].beta if composed else 0.0
     return Claim(
+        name="",
         rows=model.to_data()["rows"],
-        drives=list(model.drives),
+        input_map=list(model.input_map),
         inputs=list(model.inputs),
         plant=program(model.plant),
         law=[program(term) for term in model.law],
@@ -136,9 +137,9 @@ def claim_of(
             )
             for cell in (sampled.cells if sampled else ())
         ],
-        radii=[fraction(v) for v in found.radii],
-        held=[fraction(max(v, smallest)) for v in found.held],
-        ball=[fraction(v * (1 + 1e-5)) for v in found.ball],
+        half_widths=[fraction(v) for v in found.half_widths],
+        input_bound=[fraction(max(v, smallest)) for v in found.input_bound],
+        ultimate=[fraction(v * (1 + 1e-5)) for v in found.ultimate],
         limits=[{"name": "input", "signals": list(model.inputs), "value": Fraction(limit), "unit": "1"}],
         stroke=(Fraction(-(10**12)), Fraction(10**12)),
         accuracy=Fraction(accuracy),

@@ -5,7 +5,7 @@ from importlib import resources
 
 from arms import serial_arm
 
-from hdmm_opt.study import parse_data
+from hdmm_opt.study import load, validated
 
 #: Enough for a proof and a few runs.
 QUICK = {"method": "jaya", "population": 4, "iterations": 0, "seed": 1}
@@ -14,6 +14,11 @@ QUICK = {"method": "jaya", "population": 4, "iterations": 0, "seed": 1}
 def bundled(name):
     """A bundled study as data."""
     return tomllib.loads((resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def emla(name):
+    """A bundled study of one actuator as data, without values that are none."""
+    return load(name).model_dump(mode="json", exclude_none=True)
 
 
 def quick_arm(**changes):
@@ -42,9 +47,14 @@ def serial_study(joints, tmp_path, armature=40.0):
     names = [f"j{k + 1}" for k in range(joints)]
     section = {
         name: {
-            "armature": {"value": armature * 0.75**k, "unit": "kg m^2", "tolerance": 0.05, "source": "assumed"},
-            "torque": {"value": 1500.0 * 0.85**k, "unit": "N m", "source": "assumed"},
-            "speed_limit": 2.0, "least_effectiveness": 0.8,
+            "parameters": {
+                "armature": {"value": armature * 0.75**k, "unit": "kg m^2", "tolerance": 0.05, "source": "assumed"}
+            },
+            "limits": {
+                "torque": {"value": 1500.0 * 0.85**k, "unit": "N m", "source": "assumed"},
+                "speed": {"value": 2.0, "unit": "rad/s", "source": "assumed"},
+            },
+            "least_effectiveness": 0.8,
         }
         for k, name in enumerate(names)
     }  # fmt: skip
@@ -53,13 +63,13 @@ def serial_study(joints, tmp_path, armature=40.0):
     return {
         "study": {"name": f"serial-{joints}"},
         "plant": {"model": "arm", "urdf": str(path), "tip_m": [0.1, 0.05, 0.2], "damping": 1.0, "joints": section},
-        "uncertainty": {"payload_kg": [0.0, 0.5], "noise": {"position": 1e-6, "speed": 1e-4}},
+        "uncertainty": {"disturbances": {"payload": {"range": [0.0, 0.5]}}, "noise": {"position": 1e-6, "speed": 1e-4}},
         "reference": {"kind": "quintic", "waypoints": [start, goal], "durations_s": [1.5], "dwell_s": 0.1},
         "controller": {"law": "rac", "rate_hz": 1000, "gains": {
             "beta_1": {"min": 5.0, "max": 100.0}, "epsilon_1": {"min": 1.0, "max": 100.0},
             "beta_2": {"min": 10.0, "max": 1e5}, "epsilon_2": {"min": 1.0, "max": 100.0},
         }},
-        "requirements": {"tool_error_m": 0.2, "joint_error": dict.fromkeys(names, 0.2)},
+        "requirements": {"tracking_error_m": 0.2, "member_error": dict.fromkeys(names, 0.2)},
         "tuning": dict(QUICK),
         "validation": {"transient_s": 0.5, "monte_carlo": 4, "scenarios": [{"name": "healthy", "noise": 1.0}]},
     }  # fmt: skip
@@ -67,4 +77,4 @@ def serial_study(joints, tmp_path, armature=40.0):
 
 def study_from(data):
     """The validated study."""
-    return parse_data(data, "test")
+    return validated(data, "test")

@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 
-from hdmm_opt.enclosure import enclosure
+from hdmm_opt.motions.enclosure import enclosure
 from trajectories import Quantities
 
 

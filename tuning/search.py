@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from .budget import Budget
 from .comparison import Outcome
-from .jaya import jaya
+from .methods.jaya import jaya
+from .methods.random_search import random_search
+from .methods.tlbo import tlbo
 from .population import Evaluate, Population, start
-from .random_search import random_search
-from .tlbo import tlbo
 
 Array = NDArray[np.float64]
 

@@ -1,5 +1,7 @@
-"""Control laws: one law a file."""
+"""Control laws: one law, observer or supervisor a file."""
 
-from .rac import MODELLING as MODELLING
+from .law import GainSpec as GainSpec
+from .law import Law as Law
+from .law import ProvableLaw as ProvableLaw
+from .modelling import MODELLING as MODELLING
 from .rac import RAC as RAC
-from .rac import gain_columns as gain_columns

@@ -18,6 +18,7 @@ class Parameter:
         tolerance: Relative half width of the range that the proof covers; constant in time.
         source: One of `SOURCES`. An "assumed" value is a placeholder that the user must replace.
         meaning: One line.
+        ends: The range itself where it is not symmetric or where its ends are to be met exactly.
     """
 
     value: float
@@ -25,3 +26,27 @@ class Parameter:
     tolerance: float = 0.0
     source: str = "assumed"
     meaning: str = ""
+    ends: tuple[float, float] | None = None
+
+    def at(self, share: float) -> float:
+        """The value at a place in the tolerance, -1 … 1."""
+        return self.value * (1 + self.tolerance * share)
+
+
+#: The parameter that a degraded actuator lowers, in the plants that have it.
+EFFECTIVENESS = "effectiveness"
+
+
+def effectiveness(least: float) -> Parameter:
+    """An actuator that delivers between a least share of what is commanded and all of it, at any time."""
+    middle = (1 + least) / 2
+    return Parameter(
+        value=middle, unit="1", tolerance=1 - least / middle, source="derived" if least == 1 else "assumed",
+        meaning="share of the commanded torque that is delivered", ends=(least, 1.0),
+    )  # fmt: skip
+
+
+def healthy(parameter: Parameter) -> float:
+    """The place of full effectiveness in the tolerance of that parameter, -1 … 1."""
+    spread = parameter.value * parameter.tolerance
+    return 0.0 if spread == 0 else (1.0 - parameter.value) / spread

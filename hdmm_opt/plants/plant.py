@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 from .parameter import Parameter
 
@@ -29,6 +29,24 @@ class Limit:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Efforts:
+    """What a motion asks of an actuator beside its speed, for the limits of a reference.
+
+    Attributes:
+        names: What each is.
+        units: Their units.
+        limits: The key of `reference.limits` that bounds each from above.
+        of: (plant, disturbances) -> CasADi functions of the first state and its first three derivatives: the column of
+            the efforts, and the power that an energy-optimal motion spends, W.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    limits: tuple[str, ...]
+    of: Callable[[Plant, Sequence[float]], tuple[Any, Any]]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Plant:
     """A symbolic plant ``M_i x_i' = h_i(x, u, w, parameters)``, M_i > 0 constant in time.
 
@@ -43,15 +61,22 @@ class Plant:
         parameters: Parameters by name.
         targets: For each state what it tracks: "reference", "zero", or the index of the row whose virtual control
             is its target.
-        governed: For each state whether the law acts in its row. Shape (n,).
-        drives: For each input the row whose virtual control it is. Shape (m,).
+        controlled: For each state whether the law acts in its row. Shape (n,).
+        input_map: For each input the row whose virtual control it is. Shape (m,).
         x, u, w, p: The symbols (CasADi SX columns) of states, inputs, disturbances and parameters.
         mass: M as a function of p. Shape (n,).
         force: h as a function of x, u, w, p. Shape (n,).
         limits: Limits on signals; the first is the amplitude limit of the input.
         stroke: Admissible range of the first state.
-        outputs: Further signals for reports, by name: expressions of x, u, w, p.
+        outputs: Further signals for figures and reports, by name: expressions of x, u, w, p. "torque" is what the
+            actuator delivers, "power" what it does mechanically, W.
         load_unit: Unit of the disturbances.
+        output_units: Unit of each output.
+        operating: State at which the plant's time constants are read off, for integration steps. Shape (n,).
+        carried: Name of the parameter that holds the plant's own part of the inertia of bodies that a coupling moves;
+            empty for a plant that cannot be a member of a coupling.
+        first: Whether the first state is a position or a speed.
+        efforts: What a motion asks of it; None where only speed, acceleration and jerk are limited.
     """
 
     name: str
@@ -63,8 +88,8 @@ class Plant:
     disturbances: tuple[str, ...]
     parameters: Mapping[str, Parameter]
     targets: tuple[str | int, ...]
-    governed: tuple[bool, ...]
-    drives: tuple[int, ...]
+    controlled: tuple[bool, ...]
+    input_map: tuple[int, ...]
     x: Any
     u: Any
     w: Any
@@ -74,7 +99,36 @@ class Plant:
     limits: tuple[Limit, ...]
     stroke: tuple[float, float]
     outputs: Mapping[str, Any]
+    output_units: Mapping[str, str]
+    operating: tuple[float, ...]
     load_unit: str = "N"
+    carried: str = ""
+    first: Literal["position", "speed"] = "position"
+    efforts: Efforts | None = None
+
+    @property
+    def accelerating(self) -> int:
+        """The row whose state's rate is the acceleration that a coupling moves."""
+        return 1 if self.first == "position" else 0
+
+    @property
+    def reference_units(self) -> tuple[str, str, str, str]:
+        """Units of the first state and its first three derivatives."""
+        unit = self.state_units[0].removesuffix("/s")
+        names = [unit, *(f"{unit}/s" if k == 1 else f"{unit}/s^{k}" for k in range(1, 5))]
+        first = names.index(self.state_units[0])
+        return (names[first], names[first + 1], names[first + 2], names[first + 3])
+
+    def with_values(
+        self, *, parameters: Mapping[str, Parameter] | None = None, limits: Mapping[str, Limit] | None = None,
+        stroke: tuple[float, float] | None = None,
+    ) -> Plant:  # fmt: skip
+        """The same plant with other numbers in some places."""
+        return replace(
+            self, parameters={**self.parameters, **(parameters or {})},
+            limits=tuple((limits or {}).get(limit.name, limit) for limit in self.limits),
+            stroke=self.stroke if stroke is None else stroke,
+        )  # fmt: skip
 
     @property
     def rate(self) -> Any:
@@ -92,7 +146,9 @@ class Plant:
         return ca.substitute([self.force], [self.x, self.u, self.w, self.p], [x, u, w, p])[0]
 
     def demand(self, i: int, rate: Any, *, x: Any, w: Any, p: Any) -> Any:
-        """The value of state i + 1 that gives ``x_i' = rate``, where h_i is affine in it.
+        """The value of what drives a row that gives ``x_i' = rate``, where h_i is affine in it.
+
+        A row is driven by the state that tracks its virtual control, or where there is none by its input.
 
         Args:
             i: Row.
@@ -103,8 +159,10 @@ class Plant:
         """
         import casadi as ca
 
-        without = ca.vertcat(*(0 if j == i + 1 else x[j] for j in range(len(self.states))))
+        following = [j for j, target in enumerate(self.targets) if target == i]
+        source = self.x[following[0]] if following else self.u[self.input_map.index(i)]
+        without = ca.vertcat(*(0 if j in following[:1] else x[j] for j in range(len(self.states))))
         symbols, values = [self.x, self.u, self.w, self.p], [without, ca.SX.zeros(len(self.inputs)), w, p]
-        gain = ca.jacobian(self.force[i], self.x[i + 1])
+        gain = ca.jacobian(self.force[i], source)
         mass, force, gain = ca.substitute([self.mass[i], self.force[i], gain], symbols, values)
         return (mass * rate - force) / gain

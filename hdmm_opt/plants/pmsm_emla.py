@@ -10,17 +10,18 @@ drives the motor, smoothed over a small power; l = mu / tan(lead angle) + gear l
 1/(1 + l) and 1 - l are the driving and back-driving efficiencies of the screw (0.963/0.941/0.888; 0.962/0.937/0.874).
 The direction is that of (F_load + F_friction) x', the inertia of the load is left out of that decision.
 
-At torque level the drive closes its own current loop, seen as a lag: T tau' = u - tau.
+At torque level the drive closes its own current loop, seen as a lag: T tau' = e u - tau, e the effectiveness.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .parameter import Parameter
-from .plant import Limit, Plant
+from .parameter import EFFECTIVENESS, Parameter, effectiveness
+from .plant import Efforts, Limit, Plant
+from .registry import PlantModel
 
 _LEAD_ANGLE = math.radians(4.55)
 
@@ -45,6 +46,7 @@ _MECHANICAL = {
 _TORQUE = {
     "torque_scale": Parameter(value=1.0, unit="1", tolerance=0.03, meaning="torque delivered per torque commanded"),
     "drive_lag": Parameter(value=0.0003, unit="s", tolerance=0.2, meaning="time constant of the drive's current loop"),
+    EFFECTIVENESS: effectiveness(1.0),
 }
 _VOLTAGE = {
     "flux": Parameter(
@@ -61,6 +63,10 @@ PEAK_TORQUE = 77.0
 PHASE_VOLTAGE = 380.0 * math.sqrt(2.0 / 3.0)
 MAXIMUM_SPEED = 3877.0 / 60.0 * 0.016 / 7.7
 STROKE = (0.0, 0.6)
+
+#: Half the stroke at half the largest speed.
+_OPERATING = (sum(STROKE) / 2, MAXIMUM_SPEED / 2)
+_OUTPUT_UNITS = {"torque": "N m", "current": "A", "power": "W"}
 
 LEVELS = ("torque", "voltage")
 
@@ -157,6 +163,7 @@ def _torque_level(known: Mapping[str, Parameter]) -> Plant:
     return Plant(
         name="pmsm_emla",
         level="torque",
+        efforts=EFFORTS,
         states=("position", "speed", "torque"),
         state_units=("m", "m/s", "N m"),
         inputs=("torque_command",),
@@ -164,17 +171,20 @@ def _torque_level(known: Mapping[str, Parameter]) -> Plant:
         disturbances=("load_force",),
         parameters=known,
         targets=("reference", 0, 1),
-        governed=(True, True, False),
-        drives=(1,),
+        controlled=(True, True, False),
+        input_map=(1,),
         x=x, u=u, w=w, p=p,
         mass=ca.vertcat(1, mass, q["drive_lag"]),
-        force=ca.vertcat(x[1], force, u[0] - x[2]),
+        force=ca.vertcat(x[1], force, q[EFFECTIVENESS] * u[0] - x[2]),
         limits=(
             Limit(name="torque", signals=("torque_command",), value=PEAK_TORQUE, unit="N m", source="table"),
             _SPEED_LIMIT,
         ),
         stroke=STROKE,
-        outputs={"torque": torque, "current": ca.fabs(torque) / TORQUE_CONSTANT},
+        outputs={
+            "torque": torque, "current": ca.fabs(torque) / TORQUE_CONSTANT, "power": torque * x[1] / q["transmission"]
+        },
+        output_units=_OUTPUT_UNITS, operating=(*_OPERATING, 0.0), carried="load_mass",
     )  # fmt: skip
 
 
@@ -189,6 +199,7 @@ def _voltage_level(known: Mapping[str, Parameter]) -> Plant:
     return Plant(
         name="pmsm_emla",
         level="voltage",
+        efforts=EFFORTS,
         states=("position", "speed", "i_q", "i_d"),
         state_units=("m", "m/s", "A", "A"),
         inputs=("u_q", "u_d"),
@@ -196,8 +207,8 @@ def _voltage_level(known: Mapping[str, Parameter]) -> Plant:
         disturbances=("load_force",),
         parameters=known,
         targets=("reference", 0, 1, "zero"),
-        governed=(True, True, True, True),
-        drives=(2, 3),
+        controlled=(True, True, True, True),
+        input_map=(2, 3),
         x=x, u=u, w=w, p=p,
         mass=ca.vertcat(1, mass, inductance, inductance),
         force=ca.vertcat(
@@ -212,21 +223,17 @@ def _voltage_level(known: Mapping[str, Parameter]) -> Plant:
             _SPEED_LIMIT,
         ),
         stroke=STROKE,
-        outputs={"torque": torque, "current": ca.norm_2(x[2:4])},
+        outputs={"torque": torque, "current": ca.norm_2(x[2:4]), "power": torque * x[1] / q["transmission"]},
+        output_units=_OUTPUT_UNITS, operating=(*_OPERATING, 0.0, 0.0), carried="load_mass",
     )  # fmt: skip
 
 
-EFFORTS = (
-    ("torque", "N m"), ("negative torque", "N m"), ("current", "A"), ("negative current", "A"), ("voltage", "V"),
-)  # fmt: skip
-
-
-def effort(plant: Plant, load: float) -> tuple[Any, Any]:
+def effort(plant: Plant, loads: Sequence[float]) -> tuple[Any, Any]:
     """What a motion asks of the motor at nominal parameters and a constant load.
 
     Args:
         plant: An EMLA at either level; electrical parameters that it lacks take their default values.
-        load: Load on the rod, N.
+        loads: Load on the rod, N. Shape (1,).
 
     Returns:
         Two CasADi functions of (position, speed, acceleration, jerk): the column of `EFFORTS`, and the electrical
@@ -238,7 +245,7 @@ def effort(plant: Plant, load: float) -> tuple[Any, Any]:
     x, v, a, j = (ca.SX.sym(name) for name in ("x", "v", "a", "j"))
     values = ca.SX([p.value for p in plant.parameters.values()])
     state = ca.vertcat(x, v, *[0] * (len(plant.states) - 2))
-    demand = plant.demand(1, a, x=state, w=ca.SX([load]), p=values)
+    demand = plant.demand(1, a, x=state, w=ca.SX(list(loads)), p=values)
     constant = 1.5 * POLE_PAIRS * known["flux"].value
     current = demand / constant if plant.level == "torque" else demand
     torque = current * constant
@@ -251,3 +258,12 @@ def effort(plant: Plant, load: float) -> tuple[Any, Any]:
     power = torque * v / known["transmission"].value + 1.5 * resistance * current**2
     column = ca.vertcat(torque, -torque, current, -current, ca.sqrt(u_q**2 + u_d**2 + 1e-12))
     return ca.Function("effort", [x, v, a, j], [column]), ca.Function("power", [x, v, a, j], [power])
+
+
+#: Torque, current and voltage of the motor.
+EFFORTS = Efforts(
+    names=("torque", "negative torque", "current", "negative current", "voltage"), units=("N m", "N m", "A", "A", "V"),
+    limits=("torque_nm", "torque_nm", "current_a", "current_a", "voltage_v"), of=effort,
+)  # fmt: skip
+
+PLANT = PlantModel(levels=LEVELS, defaults=defaults, build=pmsm_emla)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .parameter import Parameter
+from .parameter import EFFECTIVENESS, Parameter, effectiveness
 from .plant import Limit, Plant
 
 #: Units of a joint by its kind: position, torque, inertia, damping.
@@ -44,11 +44,13 @@ def rigid_joint(
     return Plant(
         name="rigid_joint", level="torque", states=("position", "speed"), state_units=(position, f"{position}/s"),
         inputs=("torque_command",), input_unit=effort, disturbances=("load_force",), parameters=parameters,
-        targets=("reference", 0), governed=(True, True), drives=(1,), x=x, u=u, w=w, p=p,
+        targets=("reference", 0), controlled=(True, True), input_map=(1,), x=x, u=u, w=w, p=p,
         mass=ca.vertcat(1, value["armature"] + value["load_inertia"]),
         force=ca.vertcat(x[1], value["effectiveness"] * u - value["damping"] * x[1] - w),
         limits=(torque, Limit(name="speed", signals=("speed",), value=speed, unit=f"{position}/s", source="assumed")),
-        stroke=travel, outputs={"torque": value["effectiveness"] * u}, load_unit=effort,
+        stroke=travel, outputs={"torque": value["effectiveness"] * u, "power": value["effectiveness"] * u * x[1]},
+        output_units={"torque": effort, "power": "W"}, operating=(sum(travel) / 2, speed / 2), load_unit=effort,
+        carried="load_inertia",
     )  # fmt: skip
 
 
@@ -57,23 +59,17 @@ def joint_parameters(kind: str, **values: Any) -> dict[str, Parameter]:
 
     Args:
         kind: "revolute" or "prismatic".
-        values: A `(value, tolerance, source)` for each of "armature", "load_inertia", "effectiveness", "damping".
+        values: A `(value, tolerance, source)` for each of "armature", "load_inertia", "damping".
     """
     _, _, inertia, damping = UNITS[kind]
     known = {
         "armature": (inertia, "inertia of the actuator at the joint"),
         "load_inertia": (inertia, "part of the arm's inertia in the axis' own model"),
-        "effectiveness": ("1", "torque delivered per torque commanded"),
         "damping": (damping, "viscous friction of the joint"),
     }
-    return {
+    found = {
         name: Parameter(value=values[name][0], unit=unit, tolerance=values[name][1], source=values[name][2],
                         meaning=meaning)
         for name, (unit, meaning) in known.items()
     }  # fmt: skip
-
-
-def healthy(parameter: Parameter) -> float:
-    """The place of full effectiveness in the tolerance of that parameter, -1 … 1."""
-    spread = parameter.value * parameter.tolerance
-    return 0.0 if spread == 0 else (1.0 - parameter.value) / spread
+    return {**found, EFFECTIVENESS: effectiveness(1.0)}

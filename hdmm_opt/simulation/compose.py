@@ -1,71 +1,175 @@
-"""The closed loop as symbols: plant, law, measurement, actuator."""
+"""The closed loop as symbols: every member under its law, measurement, observers, faults, coupling, output."""
 
 from __future__ import annotations
 
-from ..control import RAC
-from .metrics import Yardstick, records
-from .system import System, Task
+from collections.abc import Sequence
+from typing import Any
+
+from ..control.observer import observed
+from ..problem import Problem
+from .acceleration import accelerations
+from .engine.system import System, Task
+from .layout import Part, size_of
+from .records import Settings, Signals, records
+
+#: A member further than this from its reference, in its unit, ends a run as lost.
+DIVERGED = 0.5
 
 
 def compose(
-    law: RAC, yardstick: Yardstick, noise: tuple[float, ...], nominal_load: float, period: float, substeps: int,
-    diverged: float, extras: frozenset[str],
-) -> System:  # fmt: skip
-    """The closed loop of a law and its plant at one rate.
-
-    Discrete states are the adaptive scalars, the commanded input, the errors, and the input that a faulty actuator
-    applies. A fault leaves ``(1 - a(t)) u + a(t) u_stuck`` with ``a = share (1 - exp(-rate (t - start)))`` from
-    its start on (Heydari Shahna 2025, P-3).
+    problem: Problem, parts: Sequence[Part], settings: Settings, period: float, substeps: int, extras: frozenset[str]
+) -> System:
+    """The loop as a system for the engine; `layout.py` says where everything lies.
 
     Args:
-        law: The law, with its plant.
-        yardstick: What the figures are measured by.
-        noise: Bounds on the measurement errors; a state with a bound of zero is measured exactly. Shape (n,).
-        nominal_load: Load that the modelling terms assume, N.
-        period: Control period, s.
-        substeps: Integration steps in a period.
-        diverged: A tracking error beyond this, m, loses the run.
+        problem: The problem.
+        parts: Its members in the loop.
+        settings: What the figures are measured by.
+        period: Duration of a tick, s.
+        substeps: Runge-Kutta steps in a tick.
         extras: What the runs need besides: "quantisation", "fault".
-
-    Returns:
-        The loop. Its constants are, in order: all gains as `gain_columns` has them, column by column; the plant's
-        parameters; spread and offset of the measurement errors of the noisy states; quantisation steps, shape (n,);
-        share, start, rate and stuck input of the fault.
     """
     import casadi as ca
 
-    plant = law.plant
-    n, k, m = len(plant.states), len(law.governed), len(plant.inputs)
-    z, r, t, tau = ca.SX.sym("z", 2 * k + 2 * m), ca.SX.sym("r", 4), ca.SX.sym("t"), ca.SX.sym("tau")
-    gains, parameters = ca.SX.sym("gains", 4 * k), plant.p
-    noisy = [i for i, bound in enumerate(noise) if bound > 0]
-    draws, spread, offset = (ca.SX.sym(name, len(noisy)) for name in ("draws", "spread", "offset"))
-    grid, fault = ca.SX.sym("grid", n), ca.SX.sym("fault", 3 + m)
-    measured = ca.vertcat(*(
-        plant.x[i] + (spread[noisy.index(i)] * draws[noisy.index(i)] + offset[noisy.index(i)] if i in noisy else 0)
-        for i in range(n)
-    ))  # fmt: skip
-    if "quantisation" in extras:
-        measured = ca.vertcat(*(
-            ca.if_else(grid[i] > 0, grid[i] * ca.floor(measured[i] / grid[i] + 0.5), measured[i]) for i in range(n)
-        ))  # fmt: skip
-    u, theta, q = law.step(
-        measured, r, z[:k], ca.reshape(gains, k, 4), ca.DM(list(plant.values().values())),
-        ca.DM([nominal_load]), period,
+    machine, n = problem.machine, len(parts)
+    x, z = ca.SX.sym("x", size_of(parts, "x")), ca.SX.sym("z", size_of(parts, "z"))
+    shared = ca.SX.sym("shared", (5 if problem.foreseeing else 4) * n)
+    own, draws = ca.SX.sym("own", len(machine.disturbances)), ca.SX.sym("draws", size_of(parts, "draws"))
+    fixed, t, tau = ca.SX.sym("fixed", size_of(parts, "fixed")), ca.SX.sym("t"), ca.SX.sym("tau")
+    r = [shared[4 * i : 4 * i + 4] for i in range(n)]
+    states = [x[part.x] for part in parts]
+    discrete = [part.discrete(z) for part in parts]
+    constants = [part.constants(fixed) for part in parts]
+    foreseen = [shared[4 * n + i] if problem.foreseeing else None for i in range(n)]
+    tasks = _tasks(problem, parts, states, discrete, constants, draws, r, foreseen, z, t, extras)
+    rates = _rates(problem, parts, states, discrete, constants, own, r)
+    errors = [states[i][0] - _taylor(r[i], tau) for i in range(n)]
+    place = machine.place(ca.vertcat(*(part[0] for part in states)))
+    wanted = machine.place(ca.vertcat(*(_taylor(r[i], tau) for i in range(n))))
+    alive = ca.SX(1)
+    for error in errors:
+        alive = alive * (ca.fabs(error) < DIVERGED)
+    outputs = [_outputs(part, states[i], discrete[i], constants[i], own) for i, part in enumerate(parts)]
+    signals = Signals(
+        states=states, errors=errors, commanded=[d["commanded"] for d in discrete], outputs=outputs,
+        estimates=[d["observer"] for d in discrete], apart=_distance(place - wanted), t=t, tau=tau,
     )  # fmt: skip
-    applied = u
+    shown: dict[str, Any] = {"x": x, "place": place, "wanted": wanted}
+    for key in ("law", "commanded", "errors"):
+        shown[key] = ca.vertcat(*(d[key] for d in discrete))
+    shown["outputs"] = ca.vertcat(*(value for column in outputs for value in column.values()))
+    return System(
+        x=x, z=z, shared=shared, own=own, draws=draws, fixed=fixed, t=t, tau=tau, tasks=tasks,
+        rate=ca.vertcat(*rates), alive=alive, records=records(problem, parts, settings, signals), signals=shown,
+        period=period, substeps=substeps,
+    )  # fmt: skip
+
+
+def _distance(away: Any) -> Any:
+    import casadi as ca
+
+    return ca.fabs(away) if away.numel() == 1 else ca.norm_2(away)
+
+
+def _taylor(r: Any, tau: Any) -> Any:
+    """The reference between ticks; within a period T this misses the fourth derivative's T⁴/24."""
+    return r[0] + tau * (r[1] + tau * (r[2] / 2 + tau * (r[3] / 6)))
+
+
+def _outputs(part: Part, x: Any, discrete: dict[str, Any], constants: dict[str, Any], own: Any) -> dict[str, Any]:
+    import casadi as ca
+
+    plant = part.law.plant
+    symbols, values = [plant.x, plant.u, plant.p], [x, discrete["applied"], constants["parameters"]]
+    return {name: ca.substitute([ca.SX(value)], symbols, values)[0] for name, value in plant.outputs.items()}
+
+
+def _rates(
+    problem: Problem, parts: Sequence[Part], states: list[Any], discrete: list[Any], constants: list[Any], own: Any,
+    r: list[Any],
+) -> list[Any]:  # fmt: skip
+    """X' of each member, under its own disturbances or under the loads of the coupling."""
+    import casadi as ca
+
+    machine = problem.machine
+    inputs, parameters = [d["applied"] for d in discrete], [c["parameters"] for c in constants]
+    loads, gained = [own] * len(parts), None
+    if machine.forces is not None:
+        guess = ca.vertcat(*(r[i][2 if p.law.plant.first == "position" else 1] for i, p in enumerate(parts)))
+        gained, load = accelerations(machine, states, inputs, parameters, own, guess)
+        loads = [load[i] for i in range(len(parts))]
+    rates = []
+    for i, part in enumerate(parts):
+        plant = part.law.plant
+        symbols, values = [plant.x, plant.u, plant.w, plant.p], [states[i], inputs[i], loads[i], parameters[i]]
+        rate = ca.substitute([plant.rate], symbols, values)[0]
+        if gained is not None:
+            row = plant.accelerating
+            rate = ca.vertcat(rate[:row], gained[i], rate[row + 1 :])
+        rates.append(rate)
+    return rates
+
+
+def _tasks(
+    problem: Problem, parts: Sequence[Part], states: list[Any], discrete: list[Any], constants: list[Any], draws: Any,
+    r: list[Any], foreseen: list[Any], z: Any, t: Any, extras: frozenset[str],
+) -> tuple[Task, ...]:  # fmt: skip
+    """One task for each control period; members of one period run together."""
+    import casadi as ca
+
+    found = []
+    for every in sorted({part.every for part in parts}):
+        after = []
+        for i, part in enumerate(parts):
+            if part.every != every:
+                after.append(z[part.z])
+                continue
+            channel = draws[part.draws]
+            measured = _measured(part, states[i], channel, constants[i], extras)
+            after.append(_controlled(problem, part, measured, r[i], foreseen[i], discrete[i], constants[i], t, extras))
+        found.append(Task(every=every, after=ca.vertcat(*after)))
+    return tuple(found)
+
+
+def _measured(part: Part, x: Any, draws: Any, constants: dict[str, Any], extras: frozenset[str]) -> Any:
+    """What the sensors say: noise, offset, rounding."""
+    import casadi as ca
+
+    noisy, n, grid = part.noisy, len(part.law.plant.states), constants["grid"]
+    sensed = [
+        x[i] + (constants["spread"][noisy.index(i)] * draws[noisy.index(i)] + constants["offset"][noisy.index(i)]
+                if i in noisy else 0)
+        for i in range(n)
+    ]  # fmt: skip
+    if "quantisation" in extras:
+        sensed = [ca.if_else(grid[i] > 0, grid[i] * ca.floor(sensed[i] / grid[i] + 0.5), sensed[i]) for i in range(n)]
+    return ca.vertcat(*sensed)
+
+
+def _controlled(
+    problem: Problem, part: Part, measured: Any, r: Any, foreseen: Any, discrete: dict[str, Any],
+    constants: dict[str, Any], t: Any, extras: frozenset[str],
+) -> Any:  # fmt: skip
+    """One period of a member's observer, law and actuator, in the order of its discrete states."""
+    import casadi as ca
+
+    plant, watched = part.law.plant, discrete["observer"]
+    seen, following = measured, watched
+    if part.observed:
+        section = problem.study.controller.observer
+        assert section is not None
+        seen = ca.vertcat(watched[:2], measured[2:])
+        following = observed(
+            problem.observers[part.name], (section.epsilon, section.sigma), part.noise[0], watched, measured[0], r[2]
+        )
+    nominal = ca.DM(list(plant.values().values()))
+    bounds = problem.members[part.index].bounds
+    load = foreseen if foreseen is not None else ca.DM([bounds.nominal[name] for name in plant.disturbances])
+    u, after, errors = part.law.step(
+        seen, r, discrete["law"], constants["gains"], nominal, load, part.period
+    )  # fmt: skip
+    applied, fault = u, constants["fault"]
     if "fault" in extras:
         a = ca.if_else(t >= fault[1], fault[0] * (1 - ca.exp(-fault[2] * (t - fault[1]))), 0)
         applied = (1 - a) * u + a * fault[3:]
-    now, acting = z[k : k + m], z[2 * k + m :]
-    outputs = {name: ca.substitute([value], [plant.u], [acting])[0] for name, value in plant.outputs.items()}
-    return System(
-        x=plant.x, z=z, shared=r, own=plant.w, draws=draws,
-        fixed=ca.vertcat(gains, parameters, spread, offset, grid, fault), t=t, tau=tau,
-        tasks=(Task(every=1, after=ca.vertcat(theta, u, q, applied)),),
-        rate=ca.substitute([plant.rate], [plant.u], [acting])[0],
-        alive=ca.fabs(plant.x[0] - r[0]) < diverged,
-        records=records(plant, yardstick, plant.x, now, r, outputs, t, tau),
-        signals={"x": plant.x, "u": now, "q": z[k + m : 2 * k + m], "theta": z[:k], **outputs},
-        period=period, substeps=substeps,
-    )  # fmt: skip
+    return ca.vertcat(after, u, applied, errors, following)

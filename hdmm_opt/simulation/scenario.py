@@ -1,21 +1,28 @@
-"""Scenarios: what load, parameters and noise a simulated run meets."""
+"""Scenarios: what disturbances, parameters, noise and faults a simulated run meets."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..study import Study
+from ..plants import EFFECTIVENESS, Parameter, Plant, healthy
+from ..problem import Problem
 
 Array = NDArray[np.float64]
+#: Breakpoints (time in s, value), linear between them, constant outside.
+Course = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
-    """An actuator that loses effectiveness from a time on; see `ClosedLoop.system`.
+    """An actuator that loses effectiveness from a time on.
+
+    It delivers ``(1 - a(t)) u + a(t) u_stuck`` with ``a = share (1 - exp(-rate (t - start)))`` from its start on
+    (Heydari Shahna 2025, P-3).
 
     Attributes:
         share: Lost share of the input in the end, 0 … 1; 1 is stuck.
@@ -29,6 +36,15 @@ class Fault:
     rate_1_s: float
     stuck: tuple[float, ...] = ()
 
+    def column(self, inputs: int) -> Array:
+        """Share, start, rate, and what a stuck actuator delivers. Shape (3 + inputs,)."""
+        stuck = (*self.stuck, *[0.0] * (inputs - len(self.stuck)))
+        return np.array([self.share, self.start_s, self.rate_1_s, *stuck])
+
+
+#: Nothing goes wrong.
+SOUND = Fault(share=0.0, start_s=0.0, rate_1_s=0.0)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
@@ -36,56 +52,79 @@ class Scenario:
 
     Attributes:
         name: Name for reports.
-        load: Breakpoints (time in s, load in N), linear between them, constant outside.
-        parameters: Position of plant parameters in their tolerance, -1 … 1; nominal where not named.
-        noise: Share of the assumed measurement error, uniformly distributed, 0 … 1.
-        bias: Share of the assumed measurement error that is constant, -1 … 1; the random part has the rest.
-        initial: Position of the first error in its assumed range, -1 … 1.
-        quantisation: Share of the assumed measurement error that is the rounding of an encoder, 0 … 1.
-        fault: What goes wrong with the actuator; outside the assumptions of a proof.
+        disturbances: Course of each disturbance; the middle of its range where not named.
+        parameters: Position of parameters in their tolerance, -1 … 1, by "member.parameter" or by "parameter" for all;
+            nominal where not named, and actuators healthy.
+        noise: Share of the assumed measurement errors, uniformly distributed, 0 … 1.
+        bias: Share of the assumed measurement errors that is constant, -1 … 1; the random part has the rest.
+        initial: Position of every member's first error in its assumed range, -1 … 1.
+        quantisation: Share of the assumed measurement errors that is the rounding of an encoder, 0 … 1.
+        faults: What goes wrong with the actuators, by member.
         seed: Seed of the noise.
     """
 
     name: str
-    load: tuple[tuple[float, float], ...]
+    disturbances: Mapping[str, Course] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     noise: float = 0.0
     bias: float = 0.0
     initial: float = 0.0
     quantisation: float = 0.0
-    fault: Fault | None = None
+    faults: Mapping[str, Fault] = field(default_factory=dict)
     seed: int = 0
 
-    @property
-    def covered(self) -> bool:
-        """Inside the assumptions that a proof is made under."""
-        return self.fault is None
+    def parameter(self, member: str, name: str, parameter: Parameter) -> float:
+        """The value of a member's parameter."""
+        usual = healthy(parameter) if name == EFFECTIVENESS else 0.0
+        return parameter.at(self.parameters.get(f"{member}.{name}", self.parameters.get(name, usual)))
 
-    def load_at(self, t: Array) -> Array:
-        """The load at given times, N. Shape of t."""
-        times, values = zip(*self.load, strict=True)
-        return np.interp(t, times, values)
+    def to_data(self) -> dict[str, Any]:
+        """The scenario as JSON data."""
+        data = asdict(self)
+        data["disturbances"] = {name: [list(p) for p in course] for name, course in self.disturbances.items()}
+        data["faults"] = {name: {**asdict(f), "stuck": list(f.stuck)} for name, f in self.faults.items()}
+        return data
 
-    def fault_column(self, inputs: int) -> Array:
-        """Share, start, rate, and what a stuck actuator delivers. Shape (3 + inputs,)."""
-        return fault_column(self.fault, inputs)
+    @staticmethod
+    def from_data(data: Mapping[str, Any]) -> Scenario:
+        """The scenario that `to_data` came from."""
+        courses = {
+            name: tuple((float(t), float(value)) for t, value in course)
+            for name, course in data["disturbances"].items()
+        }
+        faults = {name: Fault(**{**f, "stuck": tuple(f["stuck"])}) for name, f in data["faults"].items()}
+        return Scenario(**{**data, "disturbances": courses, "faults": faults})
 
 
-def fault_column(fault: Fault | None, inputs: int) -> Array:
-    """Share, start, rate, and what a stuck actuator delivers; zeros for none. Shape (3 + inputs,)."""
-    fault = fault or Fault(share=0.0, start_s=0.0, rate_1_s=0.0)
-    stuck = (*fault.stuck, *[0.0] * (inputs - len(fault.stuck)))
-    return np.array([fault.share, fault.start_s, fault.rate_1_s, *stuck])
-
-
-def scenarios(study: Study) -> list[Scenario]:
+def scenarios(problem: Problem) -> list[Scenario]:
     """The scenarios of a study."""
+    study = problem.study
     return [
         Scenario(
-            name=s.name, load=s.load_n, parameters=s.parameters, noise=s.noise, bias=s.bias, initial=s.initial,
-            quantisation=s.quantisation,
-            fault=None if s.fault is None else Fault(**s.fault.model_dump()),
+            name=s.name, disturbances=dict(s.disturbances), parameters=s.parameters, noise=s.noise, bias=s.bias,
+            initial=s.initial, quantisation=s.quantisation,
+            faults={name: Fault(**fault.model_dump()) for name, fault in s.faults.items()},
             seed=study.tuning.seed + k,
         )
         for k, s in enumerate(study.validation.scenarios)
     ]  # fmt: skip
+
+
+def within_assumptions(problem: Problem, scenario: Scenario) -> bool:
+    """Whether the assumptions of the proof hold a scenario: faults may only take effectiveness that is allowed for."""
+    return all(_allowed(problem.member(name).plant, name, fault, scenario) for name, fault in scenario.faults.items())
+
+
+def _allowed(plant: Plant, name: str, fault: Fault, scenario: Scenario) -> bool:
+    if EFFECTIVENESS not in plant.parameters or any(fault.stuck):
+        return False
+    p = plant.parameters[EFFECTIVENESS]
+    low, high = p.ends or (p.value, p.value)
+    at = scenario.parameter(name, EFFECTIVENESS, p)
+    return low - 1e-12 <= at * (1 - fault.share) and at <= high + 1e-12
+
+
+def course_at(course: Course, t: Array) -> Array:
+    """A disturbance at given times. Shape of t."""
+    times, values = zip(*course, strict=True)
+    return np.interp(t, times, values)

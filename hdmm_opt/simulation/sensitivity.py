@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .system import Record, System, Task
+from .engine.system import Record, System, Task
 
 
 def differentiated(system: System) -> System:

@@ -8,15 +8,17 @@ import pytest
 from click.testing import CliRunner
 from test_crane_dynamics import Closed
 
-from hdmm_opt import study
-from hdmm_opt.bilevel import bilevel
 from hdmm_opt.cli import main
-from hdmm_opt.crane_task import crane_cost, drive_quantities, joint_limits, tool_function
 from hdmm_opt.errors import InvalidInputError
-from hdmm_opt.job import Job, Move, carried_out
-from hdmm_opt.motion_file import document
-from hdmm_opt.motion_study import MotionStudy
-from hdmm_opt.plants.crane import tool as place
+from hdmm_opt.files.motions import document
+from hdmm_opt.machines.crane_geometry import tool as place
+from hdmm_opt.machines.crane_limits import joint_limits
+from hdmm_opt.motions.crane_task import crane_cost, drive_quantities, tool_function
+from hdmm_opt.motions.from_study import job_of
+from hdmm_opt.motions.sequence import Job, Move, carried_out
+from hdmm_opt.motions.two_level import bilevel
+from hdmm_opt.study import read as study
+from hdmm_opt.study.motion import MotionStudy
 from trajectories import Ball, LimitViolatedError, violations
 
 START, PLACE = (0.2, -1.2, 0.2), (3.0, 2.2)
@@ -75,7 +77,7 @@ def test_one_level_bounds_two_and_speed_costs_energy(found):
 
 def test_the_study_is_of_a_motion_alone(found):
     chosen = study.load_any("crane-p14")
-    assert isinstance(chosen, MotionStudy) and [move.payload for move in chosen.job().moves] == [60.0, 0.0]
+    assert isinstance(chosen, MotionStudy) and [move.payload for move in job_of(chosen).moves] == [60.0, 0.0]
     with pytest.raises(InvalidInputError, match='use "hdmm-opt trajectory crane-p14"'):
         study.load("crane-p14")
     data = json.loads(json.dumps(document(chosen, found.ways), allow_nan=False))
@@ -119,7 +121,7 @@ offset_m = 1.0
 def test_a_study_of_moves_makes_motions_past_obstacles(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(FILE)
-    job = study.load_any(str(path)).job()
+    job = job_of(study.load_any(str(path)))
     result = CliRunner().invoke(main, ["trajectory", str(path), "-o", str(tmp_path / "mine.json")])
     assert result.exit_code == 0 and "spline program" in result.output and "assumed" in result.output
     data = json.loads((tmp_path / "mine.json").read_text())

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hdmm_opt.errors import InvalidInputError
-from hdmm_opt.plants.crane import BASE, ELBOW, LIFT, TELESCOPE, TILT, TOOL, tool
-from hdmm_opt.plants.rigid_body import pose
-from hdmm_opt.plants.urdf import bodies
+from hdmm_opt.machines.crane_geometry import BASE, ELBOW, LIFT, TELESCOPE, TILT, TOOL, tool
+from hdmm_opt.machines.rigid_body import pose
+from hdmm_opt.machines.urdf import bodies
 
 
 @pytest.mark.parametrize("loop", [LIFT, TILT])

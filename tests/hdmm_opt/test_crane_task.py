@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from crane_tasks import GROUND, excess, place, random_task
 
-from hdmm_opt.crane_task import crane_cost, crane_task, drive_quantities, joint_limits, tool_function
-from hdmm_opt.enclosure import enclosure
 from hdmm_opt.errors import InvalidInputError
-from hdmm_opt.plants.crane import LIFT, TILT
+from hdmm_opt.machines.crane_geometry import LIFT, TILT
+from hdmm_opt.machines.crane_limits import joint_limits
+from hdmm_opt.motions.crane_task import crane_cost, crane_task, drive_quantities, tool_function
+from hdmm_opt.motions.enclosure import enclosure
 from trajectories import LimitViolatedError, Spline, Waypoint, pieces, solve
 from trajectories.spline import clamped_knots
 

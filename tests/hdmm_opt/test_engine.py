@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from hdmm_opt.simulation import Batch, Engine, Record, System, Task, kernel
+from hdmm_opt.simulation.engine import Batch, Engine, Record, System, Task, kernel
+from hdmm_opt.simulation.engine.virtual import uniform
 from hdmm_opt.simulation.sensitivity import differentiated
-from hdmm_opt.simulation.virtual import uniform
-from stability.expression import straight_line
+from stability.enclosures.translation import straight_line
 
 TICK = 1e-3
 

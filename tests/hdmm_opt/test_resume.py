@@ -13,7 +13,7 @@ from importlib import resources
 import pytest
 
 from hdmm_opt.errors import InvalidInputError
-from hdmm_opt.state import State
+from hdmm_opt.files.state import Journal, State
 
 KILLS = 20
 
@@ -108,3 +108,21 @@ def test_a_state_belongs_to_its_job(tmp_path):
     assert json.loads((tmp_path / "often.state").read_text(encoding="utf-8"))["parts"]["count"] == 0
     often.put("count", 100)
     assert State(tmp_path / "often.state", {}, resume=True).get("count") == 100
+
+
+def test_a_journal_grows_by_lines_and_drops_one_that_was_cut(tmp_path):
+    path = tmp_path / "j.state"
+    journal = Journal(path, {"job": 1}, resume=False)
+    for k in range(3):
+        journal.add([k, {"x": k}])
+    size = path.stat().st_size
+    journal.add([3, {"x": 3}])
+    assert path.stat().st_size - size < size / 2  # appended, not written anew
+    path.write_text(path.read_text(encoding="utf-8")[:-5], encoding="utf-8")
+    assert Journal(path, {"job": 1}, resume=True).entries == [[k, {"x": k}] for k in range(3)]
+    with pytest.raises(InvalidInputError, match="another study, seed, budget or release"):
+        Journal(path, {"job": 2}, resume=True)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace('"x": 1', '"x": 7'), encoding="utf-8")
+    with pytest.raises(InvalidInputError, match="line 3 was changed"):
+        Journal(path, {"job": 1}, resume=True)

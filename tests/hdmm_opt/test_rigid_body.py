@@ -6,8 +6,8 @@ import pinocchio
 import pytest
 
 from hdmm_opt.errors import InvalidInputError
-from hdmm_opt.plants.rigid_body import GRAVITY, Payload, inverse_dynamics, mass_matrix, pose
-from hdmm_opt.plants.urdf import bodies
+from hdmm_opt.machines.rigid_body import GRAVITY, Payload, inverse_dynamics, mass_matrix, pose
+from hdmm_opt.machines.urdf import bodies
 
 
 def vector(values):

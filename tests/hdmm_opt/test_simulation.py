@@ -1,33 +1,48 @@
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
+from machines import emla, quick_arm, serial_study, study_from
 from scipy.integrate import solve_ivp
 
 from hdmm_opt import study
-from hdmm_opt.control import RAC
+from hdmm_opt.design.certify import sampled
+from hdmm_opt.design.start import cascade
+from hdmm_opt.design.statistics import clopper_pearson
+from hdmm_opt.errors import InvalidInputError
+from hdmm_opt.machines.rigid_body import Payload, inverse_dynamics
+from hdmm_opt.machines.urdf import bodies
 from hdmm_opt.plants import pmsm_emla
 from hdmm_opt.problem import assemble
-from hdmm_opt.proof import certificate
-from hdmm_opt.simulation import ClosedLoop, Fault, Run, Scenario, Yardstick, scenarios
-from hdmm_opt.validation import clopper_pearson
-from stability import Failure, Gains
+from hdmm_opt.simulation import Fault, Loop, Run, Scenario, scenarios, within_assumptions
+from stability import Failure
 from trajectories import Reference, constant, quintic
 
-GAINS = (Gains(beta=24.0, epsilon=50.0, delta=2.0, sigma=5.0), Gains(beta=5900.0, epsilon=200.0, delta=1.0, sigma=20.0))
+#: β, ε, δ, σ of two rows.
+VALUES = (24.0, 50.0, 2.0, 5.0, 5900.0, 200.0, 1.0, 20.0)
+GAINS = {"actuator": VALUES}
 MOVE = Reference(segments=(constant(0.1, 0, 0.2), quintic(0.1, 0.2, 0.2, 2.5), constant(0.2, 2.7, 3)))
 
 
 def loop(period=1e-3, noise=(0.0, 0.0, 0.0), **more):
-    return ClosedLoop(
-        law=RAC(plant=pmsm_emla("torque")),
-        period=period,
-        noise=noise,
-        initial=(1e-3, 0.0, 0.0),
-        nominal_load=70e3,
-        yardstick=Yardstick(transient=0.5, band=1e-3, transmission=3.3e-4),
-        **more,
-    )
+    """The EMLA at torque level with its bundled numbers along one move; the nominal load is 70 kN."""
+    data = emla("emla-p2")
+    data["plant"]["parameters"] = {}
+    data["uncertainty"] = {
+        "disturbances": {"load_force": {"range": [65e3, 75e3]}},
+        "noise": dict(zip(("position", "speed", "torque"), noise, strict=True)),
+        "initial": {"position": 1e-3},
+    }
+    data["controller"]["rate_hz"] = 1 / period
+    data["validation"]["transient_s"], data["requirements"]["tracking_error_m"] = 0.5, 1e-3
+    data["validation"]["scenarios"] = [{"name": "plain"}]
+    return Loop(assemble(study.validated(data, "test"), (MOVE,)), **more)
+
+
+def under(load, **more):
+    """A scenario with a load, constant or of a course."""
+    return Scenario(name="x", disturbances={"load_force": load if isinstance(load, tuple) else ((0.0, load),)}, **more)
 
 
 def test_agrees_with_an_independent_adaptive_integrator():
@@ -47,41 +62,80 @@ def test_agrees_with_an_independent_adaptive_integrator():
     for k in range(1500):
         states.append(x)
         ref = MOVE(1e-3 * k)[:, 0]
-        g1, g2 = GAINS
+        (b1, e1, d1, s1), (b2, e2, d2, s2) = VALUES[:4], VALUES[4:]
         q1 = x[0] - ref[0]
-        q2 = x[1] - ref[1] + 0.5 * (g1.beta + g1.epsilon * theta[0]) * q1
-        u = np.clip(-0.5 * (g2.beta + g2.epsilon * theta[1]) * q2, -77, 77)
-        for i, (g, e) in enumerate(((g1, q1), (g2, q2))):
-            theta[i] += 1e-3 * (-g.delta * g.sigma * theta[i] + 0.5 * g.epsilon * g.delta * e * e)
+        q2 = x[1] - ref[1] + 0.5 * (b1 + e1 * theta[0]) * q1
+        u = np.clip(-0.5 * (b2 + e2 * theta[1]) * q2, -77, 77)
+        for i, (epsilon, delta, sigma, e) in enumerate(((e1, d1, s1, q1), (e2, d2, s2, q2))):
+            theta[i] += 1e-3 * (-delta * sigma * theta[i] + 0.5 * epsilon * delta * e * e)
         x = solve_ivp(plant, (0, 1e-3), x, args=(u,), rtol=1e-10, atol=1e-12, method="DOP853").y[:, -1]
-    trace = loop().run(GAINS, MOVE, Scenario(name="x", load=((0.0, load),)), duration=1.5)
+    trace = loop().trace(GAINS, under(load), duration=1.5).members["actuator"]
     assert np.abs(trace.x[0] - np.array(states)[:, 0]).max() < 1e-8
     assert np.abs(trace.x[2] - np.array(states)[:, 2]).max() < 2e-3
+
+
+def test_the_coupled_loop_is_that_of_an_independent_integration(tmp_path):
+    """Two joints, one period after the other by an adaptive method on a mass matrix of its own."""
+    problem = assemble(study_from(serial_study(2, tmp_path)))
+    gains = cascade(problem, 10.0, (8.0,))
+    scenario = Scenario(name="plain", disturbances={"payload": ((0.0, 0.3),)})
+    trace = Loop(problem).trace(gains, scenario)
+    x, wanted = (np.array([getattr(m, key)[:2] for m in trace.members.values()]) for key in "xr")
+    tree = bodies((tmp_path / "arm2.urdf").read_text())
+    q, v, a = (ca.SX.sym(name, 2) for name in "qva")
+    load = Payload(body=1, mass=0.3, position=(0.1, 0.05, 0.2))
+    torque = ca.Function("torque", [q, v, a], [inverse_dynamics(tree, q, v, a, payloads=(load,))])
+    armature = np.array([p.parameters["armature"].value for p in problem.machine.plants])
+    damping = np.array([p.parameters["damping"].value for p in problem.machine.plants])
+
+    def rate(_, state, u):
+        still = np.array(torque(state[:2], state[2:], [0, 0])).ravel()
+        mass = np.column_stack([np.array(torque(state[:2], state[2:], e)).ravel() - still for e in np.eye(2)])
+        push = u - damping * state[2:] - still
+        return np.concatenate([state[2:], np.linalg.solve(mass + np.diag(armature), push)])
+
+    theta, worst = np.zeros((2, 2)), 0.0
+    state = np.array([*(member.reference(0.0)[0, 0] for member in problem.members), 0, 0])
+    for k in range(400):
+        worst = max(worst, np.abs(state[:2] - x[:, 0, k]).max())
+        u = np.zeros(2)
+        for i, (name, member) in enumerate(zip(problem.machine.members, problem.members, strict=True)):
+            r = member.reference(k * problem.period)[:, 0]
+            first, second = member.gains(gains[name])
+            e1 = state[i] - r[0]
+            k1 = -(first.beta + first.epsilon * theta[i, 0]) * e1 / 2 + r[1]
+            e2 = state[2 + i] - k1
+            u[i] = -(second.beta + second.epsilon * theta[i, 1]) * e2 / 2
+            for j, (g, e) in enumerate(((first, e1), (second, e2))):
+                theta[i, j] += problem.period * (g.epsilon * g.delta * e**2 / 2 - g.delta * g.sigma * theta[i, j])
+        state = solve_ivp(rate, (0, problem.period), state, args=(u,), rtol=1e-10, atol=1e-12).y[:, -1]
+    assert np.abs(x[:, 0, :400] - wanted[:, 0, :400]).max() > 1e-4
+    assert worst < 1e-8
 
 
 def test_finer_steps_change_nothing_that_matters():
     coarse, fine = loop(), loop(refinement=4)
     runs = [
-        part.run(GAINS, MOVE, Scenario(name="x", load=((0.0, 65e3), (1.0, 65e3), (1.1, 76e3))))
-        for part in (coarse, fine)
+        part.trace(GAINS, under(((0.0, 65e3), (1.0, 65e3), (1.1, 76e3)))).members["actuator"] for part in (coarse, fine)
     ]
     assert np.abs(runs[0].x[0] - runs[1].x[0]).max() < 1e-8
 
 
 def test_divergence_is_seen_and_ends_the_run():
-    wild = (Gains(beta=3000.0), Gains(beta=5e6))
-    trace = loop(period=0.02).run(wild, MOVE, Scenario(name="x", load=((0.0, -9e5),)), duration=60.0)
-    assert trace.diverged and trace.t[-1] < 59
-    run = Run(gains=wild, scenario=Scenario(name="x", load=((0.0, -9e5),)))
-    (figures,) = loop(period=0.02).figures([run], MOVE, duration=60.0)
-    assert figures.maximum_error_m == np.inf and figures.diverged and np.isfinite(figures.peak_torque_nm)
+    wild = {"actuator": (3000.0, 0.0, 1.0, 1.0, 5e6, 0.0, 1.0, 1.0)}
+    part, load = loop(period=0.02), under(-9e5)
+    trace = part.trace(wild, load)
+    assert np.isfinite(trace.diverged_s) and trace.t[-1] < 2.5
+    (figures,) = part.figures([Run(gains=wild, scenario=load)])
+    assert figures.maximum_error_m == np.inf and figures.diverged
+    assert np.isfinite(figures.members["actuator"].peaks["torque"])
 
 
 def test_noise_and_start_stay_in_their_assumptions_and_repeat():
-    made = Scenario(name="x", load=((0.0, 70e3),), noise=0.5, initial=-1.0, seed=9)
+    made = under(70e3, noise=0.5, initial=-1.0, seed=9)
     part = loop(noise=(1e-5, 1e-3, 0.0))
-    clean = part.run(GAINS, MOVE, replace(made, noise=0.0), duration=0.3)
-    first, again = (part.run(GAINS, MOVE, made, duration=0.3) for _ in range(2))
+    clean = part.trace(GAINS, replace(made, noise=0.0), duration=0.3).members["actuator"]
+    first, again = (part.trace(GAINS, made, duration=0.3).members["actuator"] for _ in range(2))
     assert (first.x == again.x).all()
     assert first.error[0] == pytest.approx(-1e-3)
     assert 0 < np.abs(first.q - clean.q)[0].max() < 2 * 5e-6
@@ -90,39 +144,43 @@ def test_noise_and_start_stay_in_their_assumptions_and_repeat():
 def test_figures_are_those_of_the_trace():
     """The records of the engine against NumPy on the signals of the same run."""
     part = loop(noise=(1e-5, 1e-3, 0.0))
-    scenario = Scenario(name="x", load=((0.0, 65e3), (1.0, 65e3), (1.1, 76e3)), noise=1.0, initial=1.0, bias=0.2)
-    (found,) = part.figures([Run(gains=GAINS, scenario=scenario)], MOVE)
-    trace = part.run(GAINS, MOVE, scenario)
-    error, late, torque = np.abs(trace.error), trace.t >= 0.5, trace.outputs["torque"]
+    scenario = under(((0.0, 65e3), (1.0, 65e3), (1.1, 76e3)), noise=1.0, initial=1.0, bias=0.2)
+    (found,) = part.figures([Run(gains=GAINS, scenario=scenario)])
+    trace, own = part.trace(GAINS, scenario), found.members["actuator"]
+    signals = trace.members["actuator"]
+    error, late, torque = np.abs(trace.error), trace.t >= 0.5, signals.outputs["torque"]
+    assert error == pytest.approx(np.abs(signals.error))
     assert found.largest_error_m >= error.max() == pytest.approx(found.largest_error_m, rel=1e-3)
     assert found.maximum_error_m == pytest.approx(error[late].max(), rel=1e-3)
     assert found.rms_error_m == pytest.approx(np.sqrt(np.mean(error[late] ** 2)), rel=1e-12)
     assert found.settling_time_s == pytest.approx(trace.t[np.flatnonzero(error > 1e-3)[-1] + 1])
-    assert found.peak_torque_nm == np.abs(torque).max()
-    assert found.rms_torque_nm == pytest.approx(np.sqrt(np.mean(torque**2)), rel=1e-12)
-    assert found.peak_current_a == trace.outputs["current"].max()
-    assert found.peak_input == np.abs(trace.u).max()
-    assert found.energy_j == pytest.approx((torque * trace.x[1]).sum() * 1e-3 / 3.3e-4, rel=1e-12)
+    assert own.peaks["torque"] == np.abs(torque).max()
+    assert own.rms["torque"] == pytest.approx(np.sqrt(np.mean(torque**2)), rel=1e-12)
+    assert own.peaks["current"] == signals.outputs["current"].max()
+    assert own.peak_input == np.abs(signals.u).max()
+    assert own.largest_error == found.largest_error_m and own.maximum_error == found.maximum_error_m
+    transmission = pmsm_emla("torque").values()["transmission"]
+    assert own.energy_j == pytest.approx((torque * signals.x[1]).sum() * 1e-3 / transmission, rel=1e-12)
     assert found.itae == pytest.approx((trace.t * error).sum() * 1e-3, rel=1e-12)
-    assert found.limit_use >= np.abs(trace.u).max() / 77.0
+    assert found.limit_use >= np.abs(signals.u).max() / 77.0
 
 
 def test_a_quantised_position_stays_inside_its_bound_and_a_fault_outside_the_assumptions():
     part = loop(noise=(1e-4, 1e-3, 0.0))
-    coarse = Scenario(name="x", load=((0.0, 70e3),), quantisation=1.0)
-    trace = part.run(GAINS, MOVE, coarse, duration=1.0)
+    coarse = under(70e3, quantisation=1.0)
+    trace = part.trace(GAINS, coarse, duration=1.0).members["actuator"]
     measured = trace.q[0] + trace.r[0]
     assert np.abs(measured - trace.x[0]).max() <= 1e-4 * (1 + 1e-9)
     assert measured / 2e-4 == pytest.approx(np.round(measured / 2e-4), abs=1e-6)
     assert np.unique(np.round(measured / 2e-4)).size > 3
 
-    weak = Scenario(name="x", load=((0.0, 70e3),), fault=Fault(share=0.2, start_s=0.5, rate_1_s=50.0))
-    healthy = part.run(GAINS, MOVE, replace(weak, fault=None), duration=1.0)
-    faulty = part.run(GAINS, MOVE, weak, duration=1.0)
+    weak = under(70e3, faults={"actuator": Fault(share=0.2, start_s=0.5, rate_1_s=50.0)})
+    healthy = part.trace(GAINS, replace(weak, faults={}), duration=1.0).members["actuator"]
+    faulty = part.trace(GAINS, weak, duration=1.0).members["actuator"]
     assert (faulty.x[:, :500] == healthy.x[:, :500]).all()
     # the same load asks for the same torque: the command rises by what is lost
     assert faulty.u[0, -1] == pytest.approx(healthy.u[0, -1] / 0.8, rel=1e-2)
-    assert not weak.covered and coarse.covered
+    assert not within_assumptions(part.problem, weak) and within_assumptions(part.problem, coarse)
 
 
 def test_clopper_pearson_closed_form():
@@ -136,34 +194,52 @@ def test_clopper_pearson_closed_form():
 def test_no_run_inside_the_assumptions_leaves_the_certified_box(seed):
     """Random proved gains, random corners, switching loads: simulation never contradicts the proof."""
     problem = assemble(study.load("emla-p2"))
+    part, (member,) = Loop(problem), problem.members
     random = np.random.default_rng(seed)
     tried = 0
     while tried < 3:
-        gains = problem.gains(random.uniform(0.1, 0.6, len(problem.searched)))
-        found = certificate(problem, gains)
+        gains = problem.at(random.uniform(0.1, 0.6, problem.searched))
+        found = sampled(member, gains["actuator"])
         if isinstance(found, Failure):
             continue
         tried += 1
         times = np.sort(random.uniform(0, 4, 12))
         loads = random.choice([65e3, 76e3], 12)
-        hard = Scenario(
-            name="x",
-            load=(
-                (0.0, 65e3),
-                *((float(t) + 1e-3 * k, float(f)) for k, (t, f) in enumerate(zip(times, loads, strict=True))),
-            ),
-            parameters={name: float(random.choice([-1, 1])) for name in problem.plant.parameters},
-            noise=1.0,
-            initial=float(random.choice([-1, 1])),
-            seed=seed,
+        course = (
+            (0.0, 65e3),
+            *((float(t) + 1e-3 * k, float(f)) for k, (t, f) in enumerate(zip(times, loads, strict=True))),
         )
-        trace = problem.loop.run(gains, problem.reference, hard, duration=5.0)
-        assert np.abs(trace.error).max() <= found.radii[0]
+        hard = under(
+            course, parameters={name: float(random.choice([-1, 1])) for name in member.plant.parameters}, noise=1.0,
+            initial=float(random.choice([-1, 1])), seed=seed,
+        )  # fmt: skip
+        trace = part.trace(gains, hard, duration=5.0).members["actuator"]
+        assert np.abs(trace.error).max() <= found.half_widths[0]
         assert np.abs(trace.x).max(axis=1) == pytest.approx(np.minimum(np.abs(trace.x).max(axis=1), found.states))
         assert np.abs(trace.u).max() <= found.effort[0]
 
 
-def test_scenarios_come_from_the_study():
-    made = scenarios(study.load("emla-p2"))
+def test_scenarios_come_from_the_study_and_go_round_as_data():
+    made = scenarios(assemble(study.load("emla-p2")))
     assert [s.name for s in made] == ["heavy", "load-steps", "light-noisy-start"]
-    assert made[1].load_at(np.array([0.0, 4.0005, 8.0])) == pytest.approx([65e3, 70.5e3, 76e3])
+    assert made[1].disturbances["load_force"][2] == (4.001, 76e3)
+    weak = replace(made[0], faults={"actuator": Fault(share=0.2, start_s=0.5, rate_1_s=50.0, stuck=(1.0,))})
+    assert Scenario.from_data(weak.to_data()) == weak
+
+
+def test_loops_run_at_several_rates():
+    """Two joints, one at half the rate: the loop is the one whose slower law is asked at every second tick."""
+    from machines import study_from
+
+    data = quick_arm()
+    data["controller"]["rates_hz"] = {"tilt": 500}
+    problem = assemble(study_from(data))
+    part = Loop(problem)
+    assert [p.every for p in part.parts] == [1, 2, 1] and part.period == 1e-3
+    gains = {m.name: m.values(np.full(len(m.searched), 0.5)) for m in problem.members}
+    trace = part.trace(gains, scenarios(problem)[0], duration=0.5)
+    held, fast = trace.members["tilt"].u[0], trace.members["lift"].u[0]
+    assert (held[:-1:2] == held[1::2]).all() and (fast[300:-1:2] != fast[301::2]).any()
+    data["controller"]["rates_hz"] = {"tilt": 300}
+    with pytest.raises(InvalidInputError, match=r"must divide the fastest rate, 1000 Hz: got 300; 333\.333 would do"):
+        assemble(study_from(data))

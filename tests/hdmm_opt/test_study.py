@@ -6,7 +6,9 @@ import pytest
 
 from hdmm_opt import study
 from hdmm_opt.errors import InvalidInputError
-from hdmm_opt.problem import assemble, resolved, study_of
+from hdmm_opt.problem import assemble
+from hdmm_opt.problem.resolved import resolved
+from hdmm_opt.study.read import load_any
 
 from importlib import resources  # isort: skip
 
@@ -28,14 +30,16 @@ def swapped(old, new, name="emla-p2"):
     return text(name).replace(old, new, 1)
 
 
-@pytest.mark.parametrize("name", [name for name in study.bundled() if isinstance(study.load_any(name), study.Study)])
+@pytest.mark.parametrize("name", [n for n in study.bundled() if isinstance(load_any(n), study.Study)])
 def test_bundled_studies_are_valid_and_survive_the_round_trip(name):
+    """A resolved study is a study, and it is resolved to itself."""
     loaded = study.load(name)
     assert loaded.study.name == name and loaded.study.summary
     problem = assemble(loaded)
-    again = assemble(study_of(resolved(problem)))
+    again = assemble(study.validated(resolved(problem), name), tuple(m.reference for m in problem.members))
     assert resolved(again) == resolved(problem)
-    assert again.bounds == problem.bounds
+    assert [m.bounds for m in again.members] == [m.bounds for m in problem.members]
+    assert [m.model for m in again.members] == [m.model for m in problem.members]
 
 
 CASES = {
@@ -61,6 +65,15 @@ CASES = {
     "wrong type": (lambda: swapped("rate_hz = 1000", 'rate_hz = "fast"'), "valid number"),
     "unreachable speed": (lambda: swapped("durations_s = [7.0, 7.0]", "durations_s = [4.0, 7.0]"), "s would do"),
     "unreachable stroke": (lambda: swapped("[0.1, 0.4, 0.1]", "[0.1, 0.9, 0.1]"), "with room for the"),
+    "unknown model": (lambda: swapped('model = "pmsm_emla"', 'model = "pmsm_emly"'), 'did you mean "pmsm_emla"?'),
+    "unknown level": (lambda: swapped('level = "torque"', 'level = "force"'), "is one of torque, voltage: got 'force'"),
+    "unknown disturbance": (lambda: swapped("disturbances.load_force", "disturbances.wind"), "disturbance"),
+    "unknown member": (lambda: swapped("[tuning]", "[plant.joints.lift]\n[tuning]"), "is not a member of this machine"),
+    "limit in another unit": (lambda: swapped("[tuning]", '[plant.joints.actuator.limits.torque]\nvalue = 9.0\nunit = "lbf"\nsource = "assumed"\n[tuning]'), 'must be "N m": got "lbf"'),
+    "stroke upside down": (lambda: swapped("[tuning]", "[plant.joints.actuator]\nstroke = [0.5, 0.1]\n[tuning]"), "needs lower < upper"),
+    "effectiveness as a parameter": (lambda: swapped("parameters.motor_inertia]\nvalue = 0.012\nunit = \"kg m^2\"", "parameters.effectiveness]\nvalue = 1.0\nunit = \"1\""), "is not a parameter of pmsm_emla"),
+    "a rate that does not divide": (lambda: swapped("rate_hz = 1000", "rate_hz = 1000\nrates_hz = { other = 500 }"), "is not a member of this machine"),
+    "a section that has no place": (lambda: swapped('level = "torque"', 'level = "torque"\nurdf = "crane"'), 'has no place with model = "pmsm_emla"'),
     "unreachable torque": (lambda: swapped("torque_nm = 37.0", "torque_nm = 20.0"), "the limit is 20"),
     "truth for a number": (lambda: swapped("rate_hz = 1000", "rate_hz = true"), "must be a number or text: got true"),
     "absurd number": (lambda: swapped("value = 2000.0", "value = 1e300"), "must be within"),
@@ -84,7 +97,9 @@ def test_bad_input_is_one_helpful_line(case):
     make, expected = CASES[case]
     message = refusal(make())
     assert expected in message, message
-    assert re.match(r"(mine\.toml|reference|controller|validation|unknown key|\"controller|controller)", message)
+    assert re.match(r'(mine\.toml|reference|controller|validation|uncertainty|unknown key|"controller)', message), (
+        message
+    )
 
 
 def test_a_missing_file_or_name():

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from hdmm_opt.crane_task import joint_limits
 from hdmm_opt.errors import InvalidInputError
-from hdmm_opt.plants.crane import reach, tool
-from hdmm_opt.tool_path import tool_path_task
+from hdmm_opt.machines.crane_geometry import reach, tool
+from hdmm_opt.machines.crane_limits import joint_limits
+from hdmm_opt.motions.tool_path import tool_path_task
 from trajectories import bezier, solve, violations
 
 START = np.array([0.3, -1.3, 0.4])

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stability import Interval, from_casadi
-from stability.bounds import range_of
-from stability.form import Form, Symbols, evaluate
+from stability.enclosures.bounds import range_of
+from stability.enclosures.form import Form, Symbols, evaluate
 
 
 def expression(build, count):

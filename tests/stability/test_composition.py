@@ -15,12 +15,12 @@ from known_answers import (
 )
 
 from stability import Composition, Failure, Gains, Interval, certify
-from stability.model import Bounds
+from stability.loops.model import Bounds
 
 
 def bound(found):
     assert isinstance(found, Composition), found
-    return 1e3 * float(found.ball[0])
+    return 1e3 * float(found.ultimate[0])
 
 
 def worst_case(w1, w2, gain=1.0):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from stability import Interval, algebraic, enclose, tangents_many
-from stability.coupling import Loads, Slices, Tube
-from stability.expression import straight_line
+from stability.enclosures.translation import straight_line
+from stability.networks.coupling import Loads, Slices, Tube
 
 NAMES = ("x0", "x1", "v0", "v1", "a0", "a1", "payload")
 
@@ -28,7 +28,10 @@ def pendulums():
 
 
 EXPRESSION = straight_line(pendulums(), NAMES)
-LOADS = Loads(expression=EXPRESSION, own=(8.0, 2.2), payload=Interval(0.0, 0.5))
+LOADS = Loads(
+    expression=EXPRESSION, own=(8.0, 2.2), disturbances={"payload": Interval(0.0, 0.5)}, first=("position", "position")
+)
+MIDDLE = LOADS.middle["payload"]
 
 
 def motion(slices=40):
@@ -51,15 +54,15 @@ def test_loads_stay_inside_what_is_foreseen_and_its_surprise(seed):
     random = np.random.default_rng(seed)
     values, slices = motion()
     tubes = (Tube(position=0.02, speed=0.1, acceleration=0.5), Tube(position=0.01, speed=0.2, acceleration=1.0))
-    foreseen = LOADS.foreseen(slices)
-    sizes, inertia = LOADS.surprise(slices, tubes)
+    foreseen = LOADS.feedforward(slices)
+    sizes, inertia = LOADS.deviation(slices, tubes)
     worst = np.zeros(2)
     for _ in range(400):
         k, i = random.integers(values.shape[2]), random.integers(values.shape[3])
         at = values[:3, :, k, i]
-        radii = np.array([[t.position, t.speed, t.acceleration] for t in tubes]).T
-        moved = at + radii * random.choice((-1.0, 1.0), at.shape)
-        load = np.array(EXPRESSION(dict(zip(NAMES, [*at.ravel(), LOADS.middle], strict=True)))) - at[2] * LOADS.own
+        half_widths = np.array([[t.position, t.speed, t.acceleration] for t in tubes]).T
+        moved = at + half_widths * random.choice((-1.0, 1.0), at.shape)
+        load = np.array(EXPRESSION(dict(zip(NAMES, [*at.ravel(), MIDDLE], strict=True)))) - at[2] * LOADS.own
         real = np.array(EXPRESSION(dict(zip(NAMES, [*moved.ravel(), random.choice((0.0, 0.5))], strict=True))))
         real = real - moved[2] * LOADS.own
         assert all(known.low <= value <= known.high for (known, _), value in zip(foreseen, load, strict=True))
@@ -70,10 +73,10 @@ def test_loads_stay_inside_what_is_foreseen_and_its_surprise(seed):
 
 def test_the_rate_of_a_foreseen_load_holds_its_differences():
     values, slices = motion()
-    foreseen = LOADS.foreseen(slices)
+    foreseen = LOADS.feedforward(slices)
     flat = values.transpose(0, 1, 2, 3).reshape(4, 2, -1)
     loads = np.array([
-        np.array(EXPRESSION(dict(zip(NAMES, [*flat[:3, :, k].ravel(), LOADS.middle], strict=True))))
+        np.array(EXPRESSION(dict(zip(NAMES, [*flat[:3, :, k].ravel(), MIDDLE], strict=True))))
         - flat[2, :, k] * LOADS.own
         for k in range(60)
     ])  # fmt: skip
@@ -134,3 +137,31 @@ def test_an_angle_that_is_used_otherwise_is_refused():
     for value in (ca.acos(u), ca.acos(u) * 2, ca.acos(u) + u):
         with pytest.raises(ValueError, match="sines and cosines alone"):
             algebraic(straight_line(ca.Function("f", [u], [value]), ("u",)))
+
+
+def test_a_load_that_does_not_depend_on_the_motion_has_no_rate():
+    """Only a disturbance, constant or not: foreseen at its middle, half its range away at most."""
+    z = ca.SX.sym("z", 4)
+    program = straight_line(ca.Function("f", [z], [z[3]]), ("x0", "v0", "a0", "load"))
+    loads = Loads(expression=program, own=(0.0,), disturbances={"load": Interval(2.0, 6.0)}, first=("position",))
+    slices = Slices(low=np.zeros((4, 1, 3)), high=np.ones((4, 1, 3)))
+    ((load, rate),) = loads.feedforward(slices)
+    assert load.low <= 4.0 <= load.high and load.high - load.low < 1e-7 and rate.magnitude < 1e-300
+    (size,), _ = loads.deviation(slices, [Tube(position=1.0, speed=1.0, acceleration=1.0)])
+    assert size == pytest.approx(2.0)
+
+
+def test_a_member_whose_first_state_is_a_speed_has_no_position():
+    """w = 3 a + 2 v + d along r0 = speed, r1 = acceleration."""
+    z = ca.SX.sym("z", 4)
+    program = straight_line(ca.Function("f", [z], [3 * z[2] + 2 * z[1] + z[3]]), ("x0", "v0", "a0", "d"))
+    loads = Loads(expression=program, own=(1.0,), disturbances={"d": Interval(-1.0, 1.0)}, first=("speed",))
+    assert [name for name, _, _ in loads.signals()] == ["v0", "a0"]
+    slices = Slices(
+        low=np.array([[[1.0]], [[0.5]], [[0.0]], [[0.0]]]), high=np.array([[[1.0]], [[0.5]], [[0.0]], [[0.0]]])
+    )
+    ((load, rate),) = loads.feedforward(slices)
+    assert (load.low + load.high) / 2 == pytest.approx(2 * 1.0 + (3 - 1) * 0.5)
+    assert (rate.low + rate.high) / 2 == pytest.approx(2 * 0.5 / 2)  # its hull with rest
+    (size,), inertia = loads.deviation(slices, [Tube(position=0.0, speed=0.1, acceleration=0.2)])
+    assert size == pytest.approx(2 * 0.1 + 2 * 0.2 + 1.0) and inertia[0, 0] == pytest.approx(2.0)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hdmm_opt.control import RAC
 from hdmm_opt.plants import pmsm_emla
 from stability import Interval, enclose, from_casadi
-from stability.form import Form, Symbols, evaluate, tangent
+from stability.enclosures.form import Form, Symbols, evaluate, tangent
 
 
 def function(build, count):
@@ -63,9 +63,9 @@ def test_enclosures_and_forms_hold_every_value(ends, shares):
         assert outer.low - 1e-9 <= exact <= outer.high + 1e-9
         assert value.range.low - 1e-9 <= exact <= value.range.high + 1e-9
         form = symbols.expand(value.form)
-        held = form.constant + form.coefficient("a") * Interval(point["x"])
-        held = held + form.coefficient("b") * Interval(point["y"])
-        assert held.low - 1e-9 <= exact <= held.high + 1e-9
+        input_bound = form.constant + form.coefficient("a") * Interval(point["x"])
+        input_bound = input_bound + form.coefficient("b") * Interval(point["y"])
+        assert input_bound.low - 1e-9 <= exact <= input_bound.high + 1e-9
 
 
 def test_what_the_law_cancels_cancels_in_the_form():
@@ -90,10 +90,10 @@ def test_tangent_holds_the_derivative(x, y, dx, dy):
     z = ca.SX.sym("z", 2)
     jacobian = ca.Function("J", [z], [ca.jacobian(build(z[0], z[1])[0], z)])
     exact = float(np.array(jacobian([x, y])).ravel() @ [dx, dy])
-    held = tangent(
+    input_bound = tangent(
         expression,
         {"x": Interval(x), "y": Interval(y)},
         {n: Form(constant=Interval(v)) for n, v in (("x", dx), ("y", dy))},
     ).constant
-    assert held.low - 1e-12 <= exact <= held.high + 1e-12
-    assert held.high - held.low < 1e-9
+    assert input_bound.low - 1e-12 <= exact <= input_bound.high + 1e-12
+    assert input_bound.high - input_bound.low < 1e-9

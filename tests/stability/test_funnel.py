@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stability import Interval
-from stability.funnel import FunnelRow, funnel_margins
+from stability.certificates.funnel import FunnelRow, funnel_margins
 
 
 def row(**changed):

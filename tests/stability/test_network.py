@@ -8,7 +8,8 @@ import pytest
 from known_answers import chain_bounds, claim_of, integrator_chain, verdict
 
 from stability import Failure, Gains
-from stability.network import Coupling, Subsystem, compose, coupled, exchange
+from stability.networks.contracts import Subsystem, replaced, solve_contracts
+from stability.networks.springs import Coupling, coupled
 
 COUNT, PERIOD, STIFFNESS = 40, 1e-3, 250.0
 
@@ -57,32 +58,32 @@ def simulate(subsystems, alone, seed, periods=3000, substeps=4, stiffness=STIFFN
 
 
 def tubes(contracts, part):
-    return np.array([getattr(contract.promise, part) for contract in contracts.values()])
+    return np.array([getattr(contract.guarantee, part) for contract in contracts.values()])
 
 
 def test_forty_loops_are_proved_together_and_simulation_agrees():
     subsystems, alone, couplings = chain()
-    contracts = compose(subsystems, coupled(alone, couplings))
+    contracts = solve_contracts(subsystems, coupled(alone, couplings))
     assert not isinstance(contracts, Failure), contracts
-    promised, promised_rate = tubes(contracts, "position"), tubes(contracts, "acceleration")
+    guaranteed, guaranteed_rate = tubes(contracts, "position"), tubes(contracts, "acceleration")
     for seed in range(3):
         largest, fastest = simulate(subsystems, alone, seed)
-        assert (largest <= promised).all() and (fastest <= promised_rate).all()
-        if seed == 0:  # all in step is the worst case: the promises are not far above it
-            assert promised[20] < 1.6 * largest[20] and promised_rate[20] < 2.5 * fastest[20]
+        assert (largest <= guaranteed).all() and (fastest <= guaranteed_rate).all()
+        if seed == 0:  # all in step is the worst case: the guarantees are not far above it
+            assert guaranteed[20] < 1.6 * largest[20] and guaranteed_rate[20] < 2.5 * fastest[20]
     for name, contract in list(contracts.items())[::13]:
         own = subsystems[name]
         assert verdict(claim_of(own.model, contract.bounds, own.gains, contract.certificate))
-        assert contract.promise.holds(contract.reached)
-        assert contract.certificate.radii[0] == contract.reached.position
+        assert contract.guarantee.holds(contract.reached)
+        assert contract.certificate.half_widths[0] == contract.reached.position
 
 
 def test_an_exchanged_actuator_is_proved_alone():
     subsystems, alone, couplings = chain()
-    contracts = compose(subsystems, coupled(alone, couplings))
+    contracts = solve_contracts(subsystems, coupled(alone, couplings))
     own, bounds = loop(outer=16.0, inner=120.0, disturbance=0.4)
     assumed = {**alone, "joint-17": bounds}
-    changed = exchange(contracts, coupled(assumed, couplings), "joint-17", own)
+    changed = replaced(contracts, coupled(assumed, couplings), "joint-17", own)
     assert not isinstance(changed, Failure)
     assert [name for name in contracts if changed[name] is not contracts[name]] == ["joint-17"]
     assert verdict(claim_of(own.model, changed["joint-17"].bounds, own.gains, changed["joint-17"].certificate))
@@ -90,21 +91,21 @@ def test_an_exchanged_actuator_is_proved_alone():
     assert (largest <= tubes(changed, "position")).all()
 
 
-def test_an_actuator_that_breaks_its_promise_is_named():
+def test_an_actuator_that_breaks_its_guarantee_is_named():
     subsystems, alone, couplings = chain(6)
     assume = coupled(alone, couplings)
-    contracts = compose(subsystems, assume)
-    weak = exchange(contracts, assume, "joint-3", loop(outer=8.0, inner=60.0)[0])
-    assert isinstance(weak, Failure) and "joint-3 needs" in weak.reason and "has promised" in weak.reason
-    wild = exchange(contracts, assume, "joint-3", loop(outer=8.0, inner=2500.0)[0])
+    contracts = solve_contracts(subsystems, assume)
+    weak = replaced(contracts, assume, "joint-3", loop(outer=8.0, inner=60.0)[0])
+    assert isinstance(weak, Failure) and "joint-3 needs" in weak.reason and "has guaranteed" in weak.reason
+    wild = replaced(contracts, assume, "joint-3", loop(outer=8.0, inner=2500.0)[0])
     assert isinstance(wild, Failure) and wild.reason.startswith("joint-3")
 
 
 def test_an_exchange_that_changes_what_others_meet_is_refused():
     subsystems, alone, couplings = chain(4)
-    contracts = compose(subsystems, coupled(alone, couplings))
+    contracts = solve_contracts(subsystems, coupled(alone, couplings))
     stiffer = [replace(c, gain=1.2 * c.gain) if c.source == "joint-1" else c for c in couplings]
-    found = exchange(contracts, coupled(alone, stiffer), "joint-1", subsystems["joint-1"])
+    found = replaced(contracts, coupled(alone, stiffer), "joint-1", subsystems["joint-1"])
     assert isinstance(found, Failure) and "changes what joint-" in found.reason
 
 
@@ -112,7 +113,7 @@ def test_an_exchange_that_changes_what_others_meet_is_refused():
 def test_couplings_that_are_too_strong_are_refused(stiffness):
     """At ω_1 ω_2 = 1500 per loop, two neighbours with k >= 750 each make the chain unstable."""
     subsystems, alone, couplings = chain(10, stiffness)
-    assert isinstance(compose(subsystems, coupled(alone, couplings)), Failure)
+    assert isinstance(solve_contracts(subsystems, coupled(alone, couplings)), Failure)
 
 
 def test_a_coupling_names_what_exists():
@@ -121,10 +122,10 @@ def test_a_coupling_names_what_exists():
         coupled(alone, [replace(couplings[0], source="elsewhere")])
 
 
-def test_a_broken_promise_is_not_hidden():
-    """A contract is only as good as its neighbours' promises: with smaller ones the proof is another."""
+def test_a_broken_guarantee_is_not_hidden():
+    """A contract is only as good as its neighbours' guarantees: with smaller ones the proof is another."""
     subsystems, alone, couplings = chain(4)
-    contracts = compose(subsystems, coupled(alone, couplings))
+    contracts = solve_contracts(subsystems, coupled(alone, couplings))
     own, contract = subsystems["joint-1"], contracts["joint-1"]
     claim = claim_of(own.model, contract.bounds, own.gains, contract.certificate)
     heavier = tuple(Fraction(1.1 * float(v)) for v in claim.disturbances["w"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from stability.observer import SampledObserver, observer_bounds, sampled_bounds
+from stability.networks.observer import SampledObserver, observer_bounds, sampled_bounds
 
 
 def peak_gain(first, second, column, output, horizon=40.0):

@@ -7,7 +7,7 @@ import pytest
 from known_answers import ORACLE_ROWS, chain_bounds, integrator_chain
 
 from stability import Gains, deviation_rows, error_rows
-from stability.quadratic import Inclusion, from_error_rows, from_period, prove, search
+from stability.certificates.quadratic import Inclusion, from_error_rows, from_period, prove, search
 
 #: (ω_1, ω_2) -> published bounds with g known and with g in ±20 %, mm.
 PUBLISHED = {(15, 100): (0.569, 0.724), (10, 60): (1.431, 1.825), (20, 80): (0.555, 0.720)}

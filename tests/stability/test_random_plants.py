@@ -69,7 +69,7 @@ def random_case(family: str, seed: int) -> Case:
     closing = from_casadi(ca.Function("term", [y], [known * y[0]]), (names[-1],))
     nothing = from_casadi(ca.Function("term", [ca.SX.sym("r")], [ca.SX(0)]), ("r0",))
     rows = tuple(
-        Row(state=s, unit="1", target="reference" if i == 0 else i - 1, governed=True) for i, s in enumerate(names)
+        Row(state=s, unit="1", target="reference" if i == 0 else i - 1, controlled=True) for i, s in enumerate(names)
     )
     ranges = {f"m{i}": (mass[i], slack[i]) for i in range(n)} | {
         f"g{i}": (drive[i], slack[i] if i else 0.0) for i in range(n)
@@ -89,7 +89,7 @@ def random_case(family: str, seed: int) -> Case:
         Gains(beta=float(2 * wd * mi / gi), epsilon=float(e), delta=0.5, sigma=float(0.5 / period))
         for wd, mi, gi, e in zip(width, mass, drive, epsilon, strict=True)
     )
-    model = LoopModel(rows=rows, drives=(n - 1,), inputs=("u",), plant=plant, law=(*(nothing,) * (n - 1), closing))
+    model = LoopModel(rows=rows, input_map=(n - 1,), inputs=("u",), plant=plant, law=(*(nothing,) * (n - 1), closing))
     return Case(model, bounds, gains, 1e3 * size, damping, friction, scale, known, bend, 0.1 * size_u)
 
 
@@ -152,7 +152,9 @@ def contradicted(family: str, seed: int) -> tuple[int, int]:
         return 0, 0
     error = attack(case, seed)
     after = int(case.bounds.transient / case.bounds.period) + 1
-    return len(good), sum(error.max() > c.radii[0] or error[after:].max() > c.ball[0] * (1 + 1e-5) for c in good)
+    return len(good), sum(
+        error.max() > c.half_widths[0] or error[after:].max() > c.ultimate[0] * (1 + 1e-5) for c in good
+    )
 
 
 @pytest.mark.parametrize(("family", "least"), [("normal", 50), ("stiff", 30), ("degenerate", 2)])

@@ -12,7 +12,7 @@ from stability import Bounds, Failure, Gains, Interval, LoopModel, Row, Sampled,
 
 def bound(found):
     assert isinstance(found, Sampled), found
-    return 1e3 * float(found.ball[0])
+    return 1e3 * float(found.ultimate[0])
 
 
 def peak(bandwidths, period, disturbance=DISTURBANCE, fine=40, horizon=3.0):
@@ -148,8 +148,8 @@ def near_a_wall(noise):
     force = z[1] + z[2] + 1e-6 / (0.16 - z[1])
     plant = from_casadi(ca.Function("plant", [z], [ca.vertcat(1.0, force)]), ("x", "u", "w"))
     term = from_casadi(ca.Function("term", [y], [ca.SX(0)]), ("x", "r1"))
-    row = Row(state="x", unit="m", target="reference", governed=True)
-    model = LoopModel(rows=(row,), drives=(0,), inputs=("u",), plant=plant, law=(term,))
+    row = Row(state="x", unit="m", target="reference", controlled=True)
+    model = LoopModel(rows=(row,), input_map=(0,), inputs=("u",), plant=plant, law=(term,))
     bounds = Bounds(
         parameters={}, disturbances={"w": Interval(0.0)}, nominal={}, reference=(Interval(0.0),) * 4, noise=(noise,),
         initial=(0.0,), period=1e-3,
@@ -163,7 +163,9 @@ def test_the_input_is_bounded_with_its_noise():
     model, bounds, gains, found = near_a_wall(0.004)
     assert verdict(claim_of(model, bounds, gains, found))
     assert isinstance(near_a_wall(0.01)[3], Failure)
-    forged = replace(found, held=np.array([0.1005]), radii=np.array([0.010152]), ball=np.array([0.010112]))
+    forged = replace(
+        found, input_bound=np.array([0.1005]), half_widths=np.array([0.010152]), ultimate=np.array([0.010112])
+    )
     louder = replace(bounds, noise=(0.01,))
     assert not verdict(claim_of(model, louder, gains, forged))
 

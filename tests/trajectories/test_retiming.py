@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from pushes import push
 
-from hdmm_opt.enclosure import enclosure
+from hdmm_opt.motions.enclosure import enclosure
 from trajectories import (
     LimitViolatedError,
     MotionLimits,

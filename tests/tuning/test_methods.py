@@ -11,8 +11,8 @@ import pytest
 
 from tuning import METHODS, Best, Budget, Derivatives, Outcome, best_of, descend, executor, front, search, start
 from tuning.decimals import rounded, shortest
-from tuning.pareto import crowded_order, pareto_jaya
-from tuning.tlbo import tlbo
+from tuning.methods.pareto import crowded_order, pareto_jaya
+from tuning.methods.tlbo import tlbo
 
 
 def sphere(points):

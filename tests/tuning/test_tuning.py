@@ -2,11 +2,9 @@ import math
 
 import numpy as np
 import pytest
-from known_answers import chain_bounds, integrator_chain
 
-from stability import Composition, Gains, certify
-from tuning import Outcome, executor, select, start
-from tuning.jaya import jaya
+from tuning import Outcome, executor, start
+from tuning.methods.jaya import jaya
 
 
 def sphere(points):
@@ -78,23 +76,3 @@ def test_executors_agree():
     items = list(range(20))
     with executor(make_square, (3,), 1) as one, executor(make_square, (3,), 2) as two:
         assert one.map(items) == two.map(items) == [i * i + 3 for i in items]
-
-
-def test_selection_lowers_gains_to_what_the_bound_needs():
-    model, bounds = integrator_chain(2), chain_bounds(2, period=1e-3)
-    limit = np.array([0.05, 1.0])
-
-    def certificate(gains):
-        return certify(model, bounds, gains, limit)
-
-    def violation(found):
-        return 0.0 if isinstance(found, Composition) and found.ball[0] <= 2e-3 else 1.0
-
-    generous = (Gains(beta=40.0), Gains(beta=300.0))
-    chosen = select(certificate, certificate, violation, [generous], [(1.0, 100.0), (10.0, 1000.0)], 2e-3)
-    assert violation(chosen.certificate) == 0.0
-    assert chosen.rounds > 0
-    hopeless = select(
-        certificate, certificate, violation, [(Gains(beta=100.0), Gains(beta=90.0))], [(1.0, 100.0)] * 2, 2e-3
-    )
-    assert violation(hopeless.certificate) == 1.0

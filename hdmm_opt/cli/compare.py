@@ -1,0 +1,71 @@
+"""`hdmm-opt compare`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .options import BUDGET, JOBS, SEED, options_of
+from .statuses import PROVED
+
+if TYPE_CHECKING:
+    from ..design.options import Options
+
+
+@click.command()
+@click.argument("study")
+@click.option("-o", "output", type=click.Path(path_type=Path), help="JSON file for gains and figures of all.")
+@SEED
+@JOBS
+@BUDGET
+def command(study: str, output: Path | None, seed: int | None, jobs: int, budget: str) -> None:
+    """Compare the law with its rivals on STUDY: equal tuning budget, same scenarios, same knowledge of the plant."""
+    sys.exit(run(study, output, options_of(jobs, None, seed, False, budget)))
+
+
+def run(name: str, output: Path | None, options: Options) -> int:
+    """Tune all, run all, show the table."""
+    from ..design.compare import compare, table
+    from ..design.options import effort_of
+    from ..errors import InvalidInputError
+    from ..files.seal import to_text
+    from ..files.sections import assumed_text
+    from ..files.text import check_writable, write_text
+    from ..problem import assemble
+    from ..simulation import scenarios, within_assumptions
+    from ..study import load
+    from .progress import bar
+
+    study = load(name)
+    if output is not None:
+        check_writable(output)
+    problem, effort = assemble(study), effort_of(study, options)
+    if not problem.searched:
+        raise InvalidInputError(f"{name}: a comparison needs gains to search: all are fixed; give one min and max")
+    budget = (effort.population, effort.iterations)
+    with bar() as progress:
+        found = compare(problem, budget, options.seed_of(study), options, progress)
+    proved = [s.name for s in scenarios(problem) if within_assumptions(problem, s)]
+    table(found, proved, problem.machine.output_unit, click.echo)
+    each = budget[0] * (budget[1] + 1)
+    click.echo(f"{each} candidates for each, on the same scenarios; * least RMS error of the output", err=True)
+    click.echo(f"assumed, to be replaced by yours: {assumed_text(problem)}", err=True)
+    if output is not None:
+        write_text(output, to_text(_data(study, found)))
+        click.echo(str(output))
+    return PROVED
+
+
+def _data(study: Any, found: Any) -> dict[str, Any]:
+    from ..design.compare import SCHEMA
+    from ..simulation.figures import plain
+
+    rows = [
+        {"name": c.name, "gains": dict(c.gains), "cost": plain(c.cost), "candidates": c.evaluations,
+         "certified_m": c.certified, "scenarios": {key: m.to_data() for key, m in c.figures.items()}}
+        for c in found
+    ]  # fmt: skip
+    return {"schema": SCHEMA, "study": study.model_dump(mode="json", exclude_none=True), "controllers": rows}

@@ -1,0 +1,68 @@
+"""`hdmm-opt falsify`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from .options import RESUME
+from .statuses import PROVED
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--budget", type=click.IntRange(1), default=300, show_default=True, help="Number of simulated runs.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the search.")
+@click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Threads for the runs.")
+@RESUME
+def command(file: Path, budget: int, seed: int, jobs: int, resume: bool) -> None:
+    """Search the worst load, parameters and start inside the assumptions of FILE, and keep the worst in it."""
+    sys.exit(run(file, budget, seed, jobs=jobs, resume=resume))
+
+
+def run(path: Path, budget: int, seed: int, *, jobs: int = 1, resume: bool = False) -> int:
+    """Attack a proved file, and write it with its worst run."""
+    from stability import checker
+
+    from ..design.falsification import falsify
+    from ..errors import DefectError, InvalidInputError
+    from ..files.read import certified_of, read
+    from ..files.restore import offered, restored
+    from ..files.seal import prove, to_text
+    from ..files.state import State
+    from ..files.text import upward, write_text
+    from ..files.validation import contradiction, stored
+    from .progress import bar
+
+    report = checker.check_file(path)
+    if report.status != PROVED:
+        raise InvalidInputError(f"{path}: {report.message}; only a proved file can be attacked")
+    document = read(path)
+    problem, gains = restored(document)
+    known = offered(document, problem)
+    loop = next(iter(known.values()))[0]
+    job = {"falsify": document["sha256"], "budget": budget, "seed": seed}
+    state = State(path.with_name(f".{path.name}.falsify.state"), job, resume=resume)
+    with bar() as progress:
+        progress.stage("falsify")
+        scenarios = [scenario for _, scenario in known.values()]
+        found = falsify(loop, gains, scenarios, budget, seed, progress.update, jobs=jobs, state=state)
+    broken = contradiction(document, found)
+    if broken is not None:
+        raise DefectError(f"{broken}; please report this file with seed {seed}")
+    finished, verdict = prove(stored(document, found))
+    if verdict.status != PROVED:
+        raise DefectError(f"the file is no longer proved with its witness: {verdict.message}")
+    # in this order: a file that is attacked already must not be attacked again by a resumed run
+    state.remove()
+    write_text(path, to_text(finished))
+    click.echo(f"{found.runs} runs, none outside the certified envelope (that proves nothing more)", err=True)
+    late, bound = found.figures.maximum_error_m, certified_of(document)
+    worst = finished["validation"]["largest_error_after_transient_m"]
+    unit = f"m{problem.machine.output_unit}"
+    recorded = f"worst on record {1e3 * worst:.4g} {unit}, certified {upward(1e3 * bound)} {unit}"
+    used = f"at most {100 * found.largest_use:.3g} % of a limit used"
+    click.echo(f"worst {1e3 * late:.4g} {unit}, {recorded}: ratio {bound / worst:.3g}; {used}")
+    return PROVED

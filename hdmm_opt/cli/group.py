@@ -1,0 +1,61 @@
+"""The command `hdmm-opt`: finds its verbs, and turns bad input into one line.
+
+Human text goes to stderr, results to stdout. Heavy libraries are imported inside the verbs; a verb is a file of this
+folder with a `command`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib import import_module
+from typing import Any
+
+import click
+
+from .statuses import INTERRUPTED, MISUSE, NOT_PROVED
+
+# The matrices here are small: threads of the linear algebra only get in the way of the search's own workers.
+for _library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+#: The verbs, in the order in which a user meets them.
+VERBS = (
+    "studies", "design", "check", "report", "simulate", "falsify", "trajectory", "compare", "tradeoff", "sweep",
+)  # fmt: skip
+
+
+class _Group(click.Group):
+    """Turns bad input into one line and exit status 2, and Ctrl-C into 130."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in VERBS:
+            return None
+        return import_module(f"{__package__}.{cmd_name}").command
+
+    def invoke(self, ctx: click.Context) -> Any:
+        from ..errors import DefectError, InvalidInputError
+
+        try:
+            return super().invoke(ctx)
+        except InvalidInputError as error:
+            click.echo(f"hdmm-opt: {error}", err=True)
+            sys.exit(MISUSE)
+        except DefectError as error:
+            click.echo(f"hdmm-opt: DEFECT of the prover: {error}", err=True)
+            sys.exit(NOT_PROVED)
+        except (KeyboardInterrupt, click.Abort):
+            click.echo("hdmm-opt: interrupted; nothing half-written, go on with --resume", err=True)
+            sys.exit(INTERRUPTED)
+
+
+@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="hdmm-opt")
+def main() -> None:
+    """Design controllers for heavy-duty mobile machines, with proofs that anyone can re-check.
+
+    Start with "hdmm-opt studies", then "hdmm-opt design emla-p2", then "hdmm-opt check emla-p2.gains.json".
+    """

@@ -1,0 +1,65 @@
+"""`hdmm-opt tradeoff`."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .options import options_of, work
+from .statuses import NOT_PROVED, PROVED
+
+if TYPE_CHECKING:
+    from ..design.options import Options
+
+#: Population and iterations of a quick trade-off of one member; those of the study where members are linked.
+QUICK = (32, 25)
+
+
+@click.command()
+@click.argument("study")
+@click.option("-o", "output", type=click.Path(path_type=Path), help="Set to write; STUDY.tradeoff.json by default.")
+@work
+def command(study: str, output: Path | None, **given: Any) -> None:
+    """The Pareto set of STUDY's gains: simulated error, certified error, and the share of the limits they use."""
+    sys.exit(run(study, output, options_of(**given)))
+
+
+def run(name: str, output: Path | None, options: Options) -> int:
+    """Search the set, write it, show it."""
+    from ..design.evaluation import OBJECTIVES
+    from ..design.options import FULL
+    from ..design.tradeoff import SCHEMA, rows, tradeoff
+    from ..errors import InvalidInputError
+    from ..files.seal import to_text
+    from ..files.text import write_text
+    from ..problem import assemble
+    from ..study import load
+    from .outputs import json_target
+    from .progress import bar
+
+    chosen = load(name)
+    problem = assemble(chosen)
+    if not problem.searched:
+        raise InvalidInputError(f"{name}: a trade-off needs gains to search: all are fixed; give one min and max")
+    target = json_target(output, f"{chosen.study.name}.tradeoff.json", "a trade-off")
+    state = target.with_name(f".{target.name}.state")
+    own = (chosen.tuning.population, chosen.tuning.iterations)
+    size = (FULL.population, FULL.iterations) if options.full else own if problem.linked else QUICK
+    with bar() as progress:
+        found, kept = tradeoff(chosen, replace(options, state=state), progress, size)
+    table = rows(found)
+    document = {"schema": SCHEMA, "study": chosen.model_dump(mode="json", exclude_none=True), "rows": table}
+    write_text(target, to_text(document))
+    kept.remove()
+    gains = list(table[0]["gains"]) if table else []
+    click.echo(",".join([*(f"{name} (share)" for name in OBJECTIVES), *gains]))
+    for row in table:
+        click.echo(",".join(f"{value:.4g}" for value in (*row["objectives"].values(), *row["gains"].values())))
+    click.echo(
+        f"{len(table)} proved designs of {found.evaluations} candidates in {target}; none of them is beaten", err=True
+    )
+    return PROVED if table else NOT_PROVED

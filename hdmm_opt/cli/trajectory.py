@@ -1,0 +1,110 @@
+"""`hdmm-opt trajectory`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .statuses import PROVED
+
+if TYPE_CHECKING:
+    from ..problem import Problem
+
+
+@click.command()
+@click.argument("study")
+@click.option("-o", "output", type=click.Path(path_type=Path), help="Write the reference as JSON.")
+def command(study: str, output: Path | None) -> None:
+    """Build the reference of STUDY alone, and show the limits that it respects."""
+    sys.exit(run(study, output))
+
+
+def run(name: str, output: Path | None) -> int:
+    """Build references or motions, show them, write them."""
+    from ..files.seal import to_text
+    from ..files.text import check_writable, write_text
+    from ..problem import assemble
+    from ..study import Study
+    from ..study.read import load_any
+
+    chosen = load_any(name)
+    if output is not None:
+        check_writable(output)
+    if isinstance(chosen, Study):
+        problem = assemble(chosen)
+        click.echo(
+            f"{chosen.study.name}: {len(chosen.reference.waypoints) - 1} moves ({chosen.reference.kind}), "
+            f"{problem.duration:.4g} s"
+        )
+        _members(problem)
+        data = _references(problem)
+    else:
+        data = _motion(chosen)
+    if output is not None:
+        write_text(output, to_text(data))
+        click.echo(str(output))
+    return PROVED
+
+
+def _references(problem: Problem) -> dict[str, Any]:
+    from ..files.sections import reference_data
+
+    return {
+        "members": [
+            {"name": m.name, "reference": reference_data(m.reference, m.plant.reference_units)} for m in problem.members
+        ]
+    }
+
+
+def _members(problem: Problem) -> None:
+    """Peaks of every member beside what limits them."""
+    from ..motions.single_axis import effort_table
+
+    if problem.loads is None:
+        (member,) = problem.members
+        for row in effort_table(problem.study, member.plant, member.reference):
+            limit = "no limit" if row["limit"] is None else f"limit {row['limit']:g}"
+            click.echo(f"  {row['quantity']:13} {row['peak']:10.4g} {row['unit']:6} {limit}")
+        return
+    foreseen = problem.loads.feedforward(problem.slices)
+    for member, (load, _), own in zip(problem.members, foreseen, problem.machine.own, strict=True):
+        unit, (position, speed, acceleration, _) = member.plant.state_units[0], member.reference.bounds()
+        click.echo(
+            f"  {member.name:10} {position[0]:.4g} to {position[1]:.4g} {unit}, speed {max(map(abs, speed)):.3g}, "
+            f"acceleration {max(map(abs, acceleration)):.3g}"
+        )
+        click.echo(
+            f"  {'':10} load {load.low:.4g} to {load.high:.4g} {member.plant.load_unit} beside an inertia of {own:g}"
+        )
+
+
+def _motion(chosen: Any) -> dict[str, Any]:
+    """The motions of a study without a controller."""
+    from trajectories import LimitViolatedError
+
+    from ..errors import InvalidInputError
+    from ..files.motions import document
+    from ..motions.crane_task import ASSUMED
+    from ..motions.from_study import motions_of
+    from .progress import bar
+
+    with bar() as progress:
+        progress.stage(chosen.study.name)
+        try:
+            ways = motions_of(chosen, progress.update)
+        except LimitViolatedError as error:
+            raise InvalidInputError(f"{chosen.study.name}: {error}") from None
+    heads = ("time [s]", "energy [J]", "lost [J]", "effort [s]", "efficiency")
+    click.echo(f"{'motion':20}" + "".join(f"{head:>12}" for head in heads))
+    for way in ways:
+        total, share = way.totals, way.efficiency
+        click.echo(
+            f"{way.name:20}{way.duration:12.4g}{total['energy']:12.5g}{total['loss']:12.5g}"
+            f"{total['effort']:12.3g}" + (f"{'-':>12}" if share is None else f"{share:12.3f}")
+        )
+    click.echo("every motion is inside its limits for all t", err=True)
+    click.echo(f"assumed, to be replaced by yours: {', '.join(ASSUMED)}", err=True)
+    return document(chosen, ways)

@@ -1,0 +1,1 @@
+"""Design: gains, proofs, validation, and what is made of many of them."""

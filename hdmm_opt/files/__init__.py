@@ -1,0 +1,1 @@
+"""Files: gain files, states of jobs, reports, verdicts."""

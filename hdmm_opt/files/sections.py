@@ -1,0 +1,175 @@
+"""Sections of a gain file."""
+
+from __future__ import annotations
+
+from decimal import ROUND_CEILING, ROUND_HALF_EVEN, Context, Decimal
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from stability import Certificate, Composition, Sampled, checker
+from stability.networks.contracts import Contract
+from stability.networks.coupling import Tube
+from stability.networks.observer import sampled_bounds
+from trajectories import Reference
+
+from ..motions.slices import HALVINGS
+from ..problem import GainSet, Member, Problem
+from ..problem.margins import output_bound
+from ..problem.member import Values
+from ..problem.problem import Contracts
+
+#: Significant digits of the certificate's rationals.
+DIGITS = 9
+#: Guarantees are written with so much room that rounding them does not break them.
+ROOM = 1 + 1e-6
+#: Room of a stated bound on a member's error, and on the output's, over what was found: the checker rounds outwards.
+ULTIMATE, OUTPUT = 1e-5, 1e-4
+
+
+def reference_data(
+    reference: Reference, units: tuple[str, str, str, str] = ("m", "m/s", "m/s^2", "m/s^3")
+) -> dict[str, Any]:
+    """A reference: splines, and the bounds of its derivatives."""
+    names = ("position", "speed", "acceleration", "jerk")
+    return {
+        "segments": [
+            {"degree": 5, "knots": s.knots.tolist(), "coefficients": s.coefficients.tolist()}
+            for s in reference.segments
+        ],
+        "derivative_bounds": [
+            {"name": name, "unit": unit, "lower": low, "upper": high}
+            for name, unit, (low, high) in zip(names, units, reference.bounds(), strict=True)
+        ],
+    }
+
+
+def model_data(member: Member) -> dict[str, Any]:
+    """Plant and law of a member as operation lists, and what its limits are about."""
+    limits = [{"name": limit.name, "signals": list(limit.signals)} for limit in member.plant.limits]
+    return {**member.model.to_data(), "limits": limits, "first": member.plant.first}
+
+
+def gains_data(member: Member, values: Values) -> list[dict[str, Any]]:
+    """The gains of a member."""
+    return [
+        {"name": item.name, "value": value, "unit": item.unit, "min": item.low, "max": item.high,
+         "meaning": item.meaning}
+        for value, item in zip(values, member.ranges, strict=True)
+    ]  # fmt: skip
+
+
+def named_gains(problem: Problem, gains: GainSet) -> dict[str, float]:
+    """Gains by name, with the member's before it where there are several."""
+    several = len(problem.members) > 1
+    return {
+        f"{m.name}.{item.name}" if several else item.name: value
+        for m in problem.members for item, value in zip(m.ranges, gains[m.name], strict=True)
+    }  # fmt: skip
+
+
+def assumptions_data(member: Member) -> list[dict[str, Any]]:
+    """The assumptions of a member."""
+    bounds, plant = member.bounds, member.plant
+    entries = []
+    for name, p in plant.parameters.items():
+        interval = bounds.parameters[name]
+        entries.append((f"parameter.{name}", interval.low, interval.high, p.unit, p.source))
+    for name, interval in bounds.disturbances.items():
+        entries.append((f"disturbance.{name}", interval.low, interval.high, plant.load_unit, "study"))
+    for name, (value, rate) in bounds.feedforward.items():
+        entries.append((f"feedforward.{name}", value.low, value.high, plant.load_unit, "study"))
+        entries.append((f"feedforward_rate.{name}", rate.low, rate.high, f"{plant.load_unit}/s", "study"))
+    for kind, values in (("noise", bounds.noise), ("initial", bounds.initial)):
+        for state, unit, value in zip(plant.states, plant.state_units, values, strict=True):
+            entries.append((f"{kind}.{state}", -value, value, unit, "study"))
+    keys = ("name", "lower", "upper", "unit", "source")
+    return [dict(zip(keys, entry, strict=True)) for entry in entries]
+
+
+def certificate_data(contract: Contract) -> dict[str, Any]:
+    """The certificate of a member, with what it guarantees where it is linked."""
+    found = contract.certificate
+    composed = isinstance(found, Composition)
+    data: dict[str, Any] = {
+        "kind": "composition" if composed else "sampled",
+        "decay": short(found.decay),
+        "half_widths": [short(v, up=True) for v in found.half_widths],
+        "input_bound": [short(v, up=True) for v in found.input_bound],
+        "envelope": {
+            "rate": short((0.4999999 if composed else 0.9999999) * found.decay),
+            "ultimate": [short(v * (1 + ULTIMATE), up=True) for v in found.ultimate],
+        },
+    }
+    if contract.guarantee is not None:
+        data["guarantee"] = _tube(contract.guarantee)
+    return data | _vectors(found, data["kind"])
+
+
+def _vectors(found: Certificate, kind: str) -> dict[str, Any]:
+    vectors = checker.VECTORS[kind]
+    if not isinstance(found, Sampled):
+        return {name: [short(v) for v in getattr(found, name)] for name in vectors}
+    cells = [
+        {
+            "transform": [[short(v) for v in row] for row in cell.transform],
+            **{name: [short(v) for v in getattr(cell, name)] for name in vectors},
+        }
+        for cell in found.cells
+    ]
+    return {"split": list(found.split), "cells": cells}
+
+
+def _tube(tube: Tube) -> list[str]:
+    return [short(ROOM * v, up=True) for v in (tube.position, tube.speed, tube.acceleration)]
+
+
+def observer_data(problem: Problem, name: str) -> dict[str, Any]:
+    """The observer of a member: its gains, and the coordinates that prove it."""
+    observer = problem.observers[name]
+    proof = sampled_bounds(observer, noise=0.0, acceleration=1.0, initial=0.0)
+    assert proof is not None
+    return {"first": observer.first, "second": observer.second, "pole": proof.pole}
+
+
+def coupling_data(problem: Problem, contracts: Contracts) -> list[dict[str, Any]]:
+    """What the members do to each other, the output, and the bound on its error."""
+    if problem.loads is None:
+        return []
+    ultimates = np.array([contracts[m.name].certificate.ultimate[0] * (1 + ULTIMATE) for m in problem.members])
+    return [{
+        "members": list(problem.machine.members),
+        "loads": problem.machine.expression.to_data(),
+        "place": problem.machine.place_expression.to_data(),
+        "halvings": HALVINGS,
+        "envelope": {"output": short(output_bound(problem, ultimates) * (1 + OUTPUT) + 1e-12, up=True)},
+    }]  # fmt: skip
+
+
+def short(value: float, *, up: bool = False) -> str:
+    """A short rational near a float, as "p/q" text; not below it where `up`."""
+    context = Context(prec=DIGITS, rounding=ROUND_CEILING if up else ROUND_HALF_EVEN)
+    return str(Fraction(context.create_decimal(Decimal(float(value)))))
+
+
+def assumed(problem: Problem) -> tuple[str, ...]:
+    """Everything that has no public source, by member and parameter."""
+    found, several = list(problem.machine.assumed), len(problem.members) > 1
+    for member in problem.members:
+        prefix = f"{member.name}." if several else ""
+        found += [f"{prefix}{key}" for key, p in member.plant.parameters.items() if p.source == "assumed"]
+        found += [f"{prefix}{limit.name} limit" for limit in member.plant.limits if limit.source == "assumed"]
+    return tuple(found)
+
+
+def assumed_text(problem: Problem) -> str:
+    """The same in one line, with the members of each parameter in brackets."""
+    members: dict[str, list[str]] = {}
+    for name in assumed(problem):
+        member, _, key = name.rpartition(".")
+        members.setdefault(key, []).append(member)
+    whole = list(problem.machine.members)
+    return ", ".join(
+        key if own == [""] else f"{key} ({'all' if own == whole else ', '.join(own)})" for key, own in members.items()
+    )

@@ -1,0 +1,54 @@
+"""Text: files written whole or not at all, and bounds printed so that they hold."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from decimal import ROUND_CEILING, Context, Decimal
+from pathlib import Path
+
+from ..errors import InvalidInputError
+
+
+def upward(bound: float, digits: int = 4) -> str:
+    """A bound with few digits, not below it."""
+    return f"{float(Context(prec=digits, rounding=ROUND_CEILING).create_decimal(Decimal(bound))):.{digits}g}"
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a whole file or nothing: a temporary file in the same folder, then a rename.
+
+    Raises:
+        InvalidInputError: the place cannot be written.
+    """
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot write there: {error.strerror}; choose a writable folder") from None
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot write there: {error.strerror}; choose another name") from None
+    finally:
+        Path(temporary).unlink(missing_ok=True)
+
+
+def check_writable(path: Path) -> None:
+    """Refuse an output place before any work is done.
+
+    Raises:
+        InvalidInputError: the folder is missing or not writable, or the path is a folder.
+    """
+    if path.is_dir():
+        raise InvalidInputError(f"{path}: is a folder; give a file name")
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot write there: {error.strerror}; choose a writable folder") from None
+    os.close(handle)
+    Path(temporary).unlink()

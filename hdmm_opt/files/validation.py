@@ -1,0 +1,93 @@
+"""The `validation` section of a gain file: what simulations showed beside what is proved."""
+
+from __future__ import annotations
+
+import json
+import math
+from fractions import Fraction
+from typing import Any
+
+from ..problem import Problem
+from ..problem.margins import certified_error
+from ..problem.problem import Contracts
+from ..simulation import Figures, Scenario, within_assumptions
+from ..simulation.figures import plain
+from ..simulation.requirements import reached, required
+from .read import certified_of, ultimate_of
+from .result import Validation, Witness
+
+
+def to_data(problem: Problem, shown: Validation, contracts: Contracts) -> dict[str, Any]:
+    """The section of a design."""
+    bound, late = certified_error(problem, contracts), shown.largest_late_error
+    members = {}
+    for member in problem.members:
+        own = [m.members[member.name] for m in shown.inside]
+        estimates = [m.estimates for m in own if m.estimates]
+        members[member.name] = {
+            "largest_error": max((m.largest_error for m in own), default=0.0),
+            "largest_error_after_transient": max((m.maximum_error for m in own), default=0.0),
+            "unit": member.plant.state_units[0],
+            **({"estimates": [max(column) for column in zip(*estimates, strict=True)]} if estimates else {}),
+        }
+    return plain({
+        "requirements": requirements(problem, shown, contracts),
+        "scenarios": [_entry(s, m, within_assumptions(problem, s)) for s, m in shown.runs],
+        "worst_case": _entry(*shown.worst, True) if shown.worst else None,
+        "monte_carlo": shown.monte_carlo,
+        "simulated_runs": len(shown.inside),
+        "integration_error_m": shown.integration_error,
+        "largest_error_m": shown.largest_error,
+        "largest_error_after_transient_m": late,
+        "bound_over_simulated": bound / late if late > 0 else None,
+        "members": members,
+    })  # fmt: skip
+
+
+def _entry(scenario: Scenario, figures: Figures, inside: bool) -> dict[str, Any]:
+    return {"scenario": scenario.to_data(), "within_assumptions": inside, "figures": figures.to_data()}
+
+
+def requirements(problem: Problem, shown: Validation, contracts: Contracts) -> list[dict[str, Any]]:
+    """Each requirement: required, simulated, and certified where it is proved."""
+    ultimates = {name: float(contract.certificate.ultimate[0]) for name, contract in contracts.items()}
+    proved = {"tracking_error_m": certified_error(problem, contracts)}
+    proved |= {f"member_error.{name}": ultimate for name, ultimate in ultimates.items()}
+    return [
+        {"name": name, "required": limit, "simulated": reached(problem, name, shown.inside),
+         "certified": proved.get(name)}
+        for name, limit in required(problem).items()
+    ]  # fmt: skip
+
+
+def contradiction(document: dict[str, Any], witness: Witness) -> str | None:
+    """What a run did that the certificates of a gain file exclude, as text; None where nothing."""
+    if not witness.largest_use < 1 - 1e-9:
+        return f"a run used {witness.largest_use:.6g} of a limit that is proved"
+    scenario = json.dumps(witness.scenario.to_data())
+    for entry in document["members"]:
+        radius, reached = float(Fraction(entry["certificate"]["half_widths"][0])), witness.largest_errors[entry["name"]]
+        late = witness.figures.members[entry["name"]].maximum_error
+        if not (reached <= radius and late <= ultimate_of(entry)):
+            return f"a run reached {reached:.6g} in {entry['name']}, certified {radius:.6g}, in scenario {scenario}"
+    late, bound = witness.figures.maximum_error_m, certified_of(document)
+    if not late <= bound:
+        return f"a run reached {late:.6g} m, certified {bound:.6g} m, in scenario {scenario}"
+    return None
+
+
+def stored(document: dict[str, Any], witness: Witness) -> dict[str, Any]:
+    """A gain file's document with the witness as its worst case, where it is worse than the one there."""
+    shown = dict(document["validation"])
+    late, bound = witness.figures.maximum_error_m, certified_of(document)
+    shown["simulated_runs"] = shown.get("simulated_runs", 0) + witness.runs
+    shown["largest_error_m"] = max(shown["largest_error_m"], witness.largest_error)
+    shown["members"] = {
+        name: {**entry, "largest_error": max(entry["largest_error"], witness.largest_errors[name])}
+        for name, entry in shown["members"].items()
+    }
+    if late >= shown["largest_error_after_transient_m"]:
+        shown["worst_case"] = _entry(witness.scenario, witness.figures, True)
+        shown["largest_error_after_transient_m"] = late
+        shown["bound_over_simulated"] = bound / late if late > 0 and math.isfinite(late) else None
+    return {**document, "validation": plain(shown)}

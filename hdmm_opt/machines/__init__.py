@@ -1,0 +1,1 @@
+"""Machines: one a file, with a `MODEL`; rigid bodies, URDF, geometry."""

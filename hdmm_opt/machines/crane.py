@@ -1,0 +1,100 @@
+"""The HIAB-class crane with an EMLA at voltage level on every joint, in coordinates of the rods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+
+from ..errors import RefusedKeyError
+from ..names import nearest
+from ..plants import Parameter, defaults, pmsm_emla
+from .crane_dynamics import JOINTS, joints_of, rod_forces
+from .crane_geometry import LIFT, TELESCOPE, TILT, tool
+from .machine import Disturbance, Machine
+from .model import Model, check_numbers, check_parameters, given, no_place, numbers_of
+
+#: Longest strokes, m.
+STROKES = {"lift": LIFT.stroke, "tilt": TILT.stroke, "telescope": TELESCOPE}
+
+
+def crane(parameters: Mapping[str, Mapping[str, Parameter]], locked: Mapping[str, float] | None = None) -> Machine:
+    """The machine; its states are those of the EMLAs, 4 a joint.
+
+    Args:
+        parameters: Replacements for those of `pmsm_emla`, by joint.
+        locked: Joints that have no actuator, and the stroke at which they stand still, m.
+    """
+    fixed = dict(locked or {})
+    kept = [k for k, name in enumerate(JOINTS) if name not in fixed]
+    known = defaults("voltage")
+    massless = {"load_mass": replace(known["load_mass"], value=0.0, tolerance=0.0, source="derived",
+                                     meaning="part of the crane's inertia in the axis' own model")}  # fmt: skip
+    plants = [
+        pmsm_emla("voltage", {**parameters.get(JOINTS[k], {}), **massless}).with_values(
+            stroke=(0.0, STROKES[JOINTS[k]])
+        )
+        for k in kept
+    ]
+    n = len(kept)
+    x, v, a, d = ca.SX.sym("x", n), ca.SX.sym("v", n), ca.SX.sym("a", n), ca.SX.sym("d", 1)
+
+    def whole(part: Any, still: bool) -> Any:
+        rest = {name: 0.0 if still else value for name, value in fixed.items()}
+        return ca.vertcat(*(part[kept.index(k)] if k in kept else rest[name] for k, name in enumerate(JOINTS)))
+
+    forces = rod_forces(whole(x, still=False), whole(v, still=True), whole(a, still=True), d[0])
+    place = ca.vertcat(*tool(joints_of(whole(x, still=False))))
+    return Machine(
+        name="crane", members=tuple(JOINTS[k] for k in kept), plants=tuple(plants),
+        disturbances=(Disturbance(name="payload", unit="kg", course="constant"),),
+        forces=ca.Function("forces", [x, v, a, d], [ca.vertcat(*(forces[k] for k in kept))]),
+        place=ca.Function("place", [x], [place]), planner="crane", coordinates=("x", "z"),
+    )  # fmt: skip
+
+
+def _members(section: Any) -> tuple[str, ...]:
+    return tuple(name for name in JOINTS if name not in section.locked)
+
+
+def _check(section: Any) -> None:
+    no_place(section, ("urdf", "tip_m", "damping"), "crane")
+    if section.level not in (None, "voltage"):
+        raise RefusedKeyError("level", f'of the crane is "voltage": got {section.level!r}', "leave it out")
+    known = {name: p for name, p in defaults("voltage").items() if name != "load_mass"}
+    for where, names in (("joints", section.joints), ("locked", section.locked)):
+        for name in names:
+            if name not in JOINTS:
+                raise RefusedKeyError(f"{where}.{name}", "is not a joint of the crane", nearest(name, JOINTS))
+    if len(section.locked) == len(JOINTS):
+        raise RefusedKeyError("locked", "must leave a joint that moves: got all of them", "unlock one")
+    for name, stroke in section.locked.items():
+        if not 0 <= stroke <= STROKES[name]:
+            rule = f"is a stroke from 0 to {STROKES[name]:g} m: got {stroke:g}"
+            raise RefusedKeyError(f"locked.{name}", rule, "correct it")
+    check_parameters("parameters", section.parameters, known, "an EMLA of the crane")
+    limits = pmsm_emla("voltage").limits
+    for name, drive in section.joints.items():
+        check_parameters(f"joints.{name}.parameters", drive.parameters, known, "an EMLA of the crane")
+        check_numbers(f"joints.{name}", drive, limits)
+        if drive.least_effectiveness is not None:
+            raise RefusedKeyError(f"joints.{name}.least_effectiveness", "has no place at voltage level", "remove it")
+
+
+def _build(section: Any) -> Machine:
+    known, found = defaults("voltage"), {}
+    shared = given(section.parameters, known)
+    for name in JOINTS:
+        own = section.joints.get(name)
+        found[name] = {**shared, **(given(own.parameters, {**known, **shared}) if own is not None else {})}
+    made = crane(found, section.locked)
+    plants = tuple(
+        numbers_of(plant, section.joints.get(name), None)
+        for name, plant in zip(made.members, made.plants, strict=True)
+    )  # fmt: skip
+    return replace(made, plants=plants)
+
+
+MODEL = Model(members=_members, check=_check, build=_build, kinds=("bspline",))

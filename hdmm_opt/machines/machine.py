@@ -1,0 +1,109 @@
+"""A machine: members with a plant each, what they do to each other, and where its output is.
+
+A coupling is written once, as F(x, v, a, d) in coordinates of the members, d the machine's disturbances. The proof
+reads F as operations (`Loads`), the simulation solves it together with the plants, the law foresees it along the
+reference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import casadi as ca
+
+from stability import Expression, Interval, algebraic
+from stability.enclosures.translation import straight_line
+from stability.networks.coupling import Loads
+
+from ..plants import Plant
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disturbance:
+    """Something from outside that a study gives a range.
+
+    Attributes:
+        name: Its name.
+        unit: SI unit.
+        course: "constant" in a run, or "any" course in time.
+    """
+
+    name: str
+    unit: str
+    course: Literal["constant", "any"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Machine:
+    """Members with their plants, and what couples them.
+
+    Attributes:
+        name: Model name, as in a study.
+        members: Names of the members.
+        plants: The plant of each.
+        disturbances: What the machine meets; without a coupling the disturbances of its only plant.
+        forces: CasADi function (x, v, a, d) -> what the coupling asks of each member, shape (n,); None where there is
+            no coupling. x, v and a are the members' position, speed and acceleration, d the disturbances in order.
+        place: CasADi function x -> output, m, of the members' first states.
+        planner: How `motions` makes references for it.
+        assumed: What has no public source, beside the parameters that say so.
+        coordinates: Names of the output's coordinates.
+    """
+
+    name: str
+    members: tuple[str, ...]
+    plants: tuple[Plant, ...]
+    disturbances: tuple[Disturbance, ...]
+    forces: Any
+    place: Any
+    planner: str
+    assumed: tuple[str, ...] = ()
+    coordinates: tuple[str, ...] = ("",)
+
+    @property
+    def own(self) -> tuple[float, ...]:
+        """The part of the bodies' inertia that each plant carries itself."""
+        return tuple(plant.parameters[plant.carried].value for plant in self.plants)
+
+    @property
+    def output_unit(self) -> str:
+        """Unit of the output: a length, or that of the first state where there is one member by itself."""
+        return self.plants[0].state_units[0] if self.forces is None else "m"
+
+    @cached_property
+    def expression(self) -> Expression:
+        """F as operations over x0…, v0…, a0…, and the disturbances."""
+        n = len(self.members)
+        names = (*(f"{letter}{j}" for letter in "xva" for j in range(n)), *(d.name for d in self.disturbances))
+        flat = ca.SX.sym("flat", len(names))
+        value = self.forces(flat[:n], flat[n : 2 * n], flat[2 * n : 3 * n], flat[3 * n :])
+        return algebraic(straight_line(ca.Function("forces", [flat], [ca.densify(value)], {"cse": True}), names))
+
+    @cached_property
+    def place_expression(self) -> Expression:
+        """The output as operations over x0…."""
+        n = len(self.members)
+        flat = ca.SX.sym("flat", n)
+        names = tuple(f"x{j}" for j in range(n))
+        place = ca.densify(self.place(flat))
+        return algebraic(straight_line(ca.Function("place", [flat], [place], {"cse": True}), names))
+
+    def loads(self, ranges: Mapping[str, Interval]) -> Loads | None:
+        """What the members do to each other, as data for the prover; None without a coupling."""
+        if self.forces is None:
+            return None
+        return Loads(
+            expression=self.expression, own=self.own, disturbances=dict(ranges),
+            first=tuple(plant.first for plant in self.plants),
+        )  # fmt: skip
+
+    def carrying(self, own: tuple[float, ...]) -> Machine:
+        """The same machine with other parts of the bodies' inertia in the plants' own models."""
+        plants = tuple(
+            plant.with_values(parameters={plant.carried: replace(plant.parameters[plant.carried], value=value)})
+            for plant, value in zip(self.plants, own, strict=True)
+        )
+        return replace(self, plants=plants)

@@ -1,0 +1,58 @@
+"""A plant by itself: a machine of one member, which meets the plant's own disturbances."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from ..errors import RefusedKeyError
+from ..names import nearest
+from ..plants import EFFECTIVENESS
+from ..plants.registry import PlantModel
+from .machine import Disturbance, Machine
+from .model import Model, check_numbers, check_parameters, given, no_place, numbers_of
+
+#: Name of the only member.
+MEMBER = "actuator"
+_ELSEWHERE = ("urdf", "tip_m", "damping", "locked", "least_lever_m_rad")
+
+
+def single(name: str, plant: PlantModel) -> Model:
+    """The model of one plant by itself.
+
+    Args:
+        name: Name of the plant.
+        plant: How it is made.
+    """
+
+    def check(section: Any) -> None:
+        no_place(section, _ELSEWHERE, name)
+        if section.level not in plant.levels:
+            raise RefusedKeyError("level", f"is one of {', '.join(plant.levels)}: got {section.level!r}", "choose one")
+        for member in section.joints:
+            if member != MEMBER:
+                raise RefusedKeyError(f"joints.{member}", "is not a member of this machine", nearest(member, [MEMBER]))
+        known, own = plant.defaults(section.level), section.joints.get(MEMBER)
+        check_parameters("parameters", section.parameters, known, name)
+        if own is not None:
+            check_parameters(f"joints.{MEMBER}.parameters", own.parameters, known, name)
+            check_numbers(f"joints.{MEMBER}", own, plant.build(section.level, {}).limits)
+            if own.least_effectiveness is not None and EFFECTIVENESS not in known:
+                rule = f'has no place with level = "{section.level}"'
+                raise RefusedKeyError(f"joints.{MEMBER}.least_effectiveness", rule, "remove it")
+
+    def build(section: Any) -> Machine:
+        known, own = plant.defaults(section.level), section.joints.get(MEMBER)
+        parameters = given(section.parameters, known)
+        parameters |= given(own.parameters, {**known, **parameters}) if own is not None else {}
+        made = plant.build(section.level, parameters)
+        made = numbers_of(made, own, None if own is None else own.least_effectiveness)
+        x = ca.SX.sym("x", 1)
+        disturbances = tuple(Disturbance(name=w, unit=made.load_unit, course="any") for w in made.disturbances)
+        return Machine(
+            name=name, members=(MEMBER,), plants=(made,), disturbances=disturbances, forces=None,
+            place=ca.Function("place", [x], [x]), planner="axis",
+        )  # fmt: skip
+
+    return Model(members=lambda section: (MEMBER,), check=check, build=build, kinds=("quintic", "bspline"))

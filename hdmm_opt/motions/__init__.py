@@ -1,0 +1,1 @@
+"""Motions: references of machines."""

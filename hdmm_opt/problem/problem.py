@@ -1,0 +1,135 @@
+"""Everything that the design of a machine works on, whether it has one member or many."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stability import Bounds, Interval
+from stability.networks.contracts import Contract, Subsystem
+from stability.networks.coupling import Loads, Slices, Tube
+from stability.networks.observer import SampledObserver, sampled_bounds
+
+from ..machines.machine import Machine
+from ..study import Study
+from .member import Member, Values
+
+Array = NDArray[np.float64]
+#: Gains of all members.
+GainSet = dict[str, Values]
+#: Proofs of all members.
+Contracts = dict[str, Contract]
+
+#: Loads are assumed this much larger than they come out here: the checker encloses them in another arithmetic.
+SPARE = 1.005
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """A study made concrete.
+
+    Attributes:
+        study: The study.
+        machine: The machine.
+        members: Its members; their `bounds` are those of members that keep to their references.
+        slices: Ranges of all references over slices of time.
+        loads: What the members do to each other; None without a coupling.
+        observers: The observer of each member by name; empty where speeds are measured.
+    """
+
+    study: Study
+    machine: Machine
+    members: tuple[Member, ...]
+    slices: Slices
+    loads: Loads | None
+    observers: Mapping[str, SampledObserver]
+
+    @property
+    def linked(self) -> bool:
+        """Whether the proof of a member rests on what members guarantee."""
+        return self.loads is not None or bool(self.observers)
+
+    @property
+    def foreseeing(self) -> bool:
+        """Whether the law knows the loads of a coupling along the reference."""
+        return self.loads is not None and "mechanics" in self.study.controller.modelling
+
+    @property
+    def period(self) -> float:
+        """Shortest control period, s."""
+        return min(member.bounds.period for member in self.members)
+
+    @property
+    def duration(self) -> float:
+        """Duration of the reference, s."""
+        return self.members[0].reference.duration
+
+    @property
+    def searched(self) -> int:
+        """Number of gains that are not fixed."""
+        return sum(len(member.searched) for member in self.members)
+
+    def member(self, name: str) -> Member:
+        """A member by its name."""
+        return self.members[self.machine.members.index(name)]
+
+    def disturbance(self, name: str) -> Interval:
+        """The assumed range of one of the machine's disturbances."""
+        return Interval(*self.study.uncertainty.disturbances[name].range)
+
+    def at(self, point: Array, *, digits: int = 4) -> GainSet:
+        """The gains at a point of the unit cube of all that is searched."""
+        found, first = {}, 0
+        for member in self.members:
+            size = len(member.searched)
+            found[member.name] = member.values(point[first : first + size], digits=digits)
+            first += size
+        return found
+
+    def point(self, gains: GainSet) -> Array:
+        """The point of that cube that stands for some gains."""
+        return np.concatenate([member.point(gains[member.name]) for member in self.members])
+
+    def subsystems(self, gains: GainSet) -> dict[str, Subsystem]:
+        """The loops with given gains."""
+        return {member.name: member.subsystem(gains[member.name]) for member in self.members}
+
+    def assume(self, guarantees: Mapping[str, Tube]) -> dict[str, Bounds]:
+        """What each member's proof assumes when all keep their guarantees."""
+        found = {member.name: member.bounds for member in self.members}
+        if self.loads is not None:
+            sizes, _ = self.loads.deviation(self.slices, [guarantees[member.name] for member in self.members])
+            for member, size in zip(self.members, sizes, strict=True):
+                (load,) = member.plant.disturbances
+                middle = Interval(0.0) if self.foreseeing else member.bounds.disturbances[load]
+                spread = {load: middle + Interval.symmetric(SPARE * size)}
+                found[member.name] = replace(member.bounds, disturbances=spread)
+        for member in self.members:
+            if member.name in self.observers:
+                noise = self._estimated(member, guarantees[member.name])
+                found[member.name] = replace(found[member.name], noise=(*noise, *member.bounds.noise[2:]))
+        return found
+
+    def _estimated(self, member: Member, tube: Tube) -> tuple[float, float]:
+        """Bounds on the errors of a member's observer."""
+        bounds = member.bounds
+        # |v(0) - r'(0)|, from the bounds on |Q_1(0)| and |Q_2(0)|
+        start = bounds.initial[1] + member.ranges[0].high / 2 * bounds.initial[0]
+        proof = sampled_bounds(
+            self.observers[member.name], noise=bounds.noise[0], initial=start,
+            acceleration=held_acceleration(tube, bounds.reference[3].magnitude, bounds.period),
+        )  # fmt: skip
+        assert proof is not None  # it was there for a tube of nothing, and its contraction does not depend on the tube
+        return proof.position, proof.speed
+
+    def still(self) -> dict[str, Tube]:
+        """Guarantees of members that keep to their references."""
+        return dict.fromkeys(self.machine.members, Tube(position=0.0, speed=0.0, acceleration=0.0))
+
+
+def held_acceleration(tube: Tube, jerk: float, period: float) -> float:
+    """Bound on |x'' - r''(t_k)| within a period: the observer is given the reference's acceleration as it is held."""
+    return (tube.acceleration + period * jerk) * (1 + 1e-9)

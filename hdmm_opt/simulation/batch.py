@@ -1,0 +1,162 @@
+"""Runs as arrays for the engine: constants, starts, references, courses of the disturbances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..problem import GainSet, Problem
+from .engine.engine import Batch
+from .layout import Part, size_of
+from .scenario import SOUND, Scenario, course_at
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One run: gains that meet a scenario."""
+
+    gains: GainSet
+    scenario: Scenario
+
+
+class Batches:
+    """Makes batches for one loop.
+
+    Args:
+        problem: The problem.
+        parts: Its members in the loop.
+        period: Duration of a tick, s.
+    """
+
+    def __init__(self, problem: Problem, parts: Sequence[Part], period: float) -> None:
+        self.problem, self.parts, self.period = problem, parts, period
+        self._shared: Array | None = None
+        self._goals: dict[int, Any] = {}
+
+    def shared(self) -> Array:
+        """References of all members, then the foreseen loads, at the ticks. Shape (ticks, 4 n or 5 n)."""
+        if self._shared is None:
+            problem, machine = self.problem, self.problem.machine
+            count = max(2, round(problem.duration / self.period))
+            t = self.times(count)
+            r = np.stack([member.reference(t) for member in problem.members])
+            columns = [r.reshape(4 * len(r), count)]
+            if problem.foreseeing:
+                assert problem.loads is not None
+                still = np.zeros(count)
+                x, v, a = (
+                    np.stack([
+                        r[k][order if p.first == "position" else order - 1] if order or p.first == "position" else still
+                        for k, p in enumerate(machine.plants)
+                    ])
+                    for order in range(3)
+                )  # fmt: skip
+                middle = np.repeat(np.array([list(problem.loads.middle.values())]).T, count, axis=1)
+                loads = np.array(machine.forces.map(count)(x, v, a, middle))
+                columns.append(loads - np.array(machine.own)[:, None] * a)
+            self._shared = np.ascontiguousarray(np.vstack(columns).T)
+        return self._shared
+
+    def times(self, count: int) -> Array:
+        """Times of the ticks, s."""
+        return np.asarray(self.period * np.arange(count), dtype=np.float64)
+
+    def batch(self, runs: Sequence[Run], duration: float | None = None) -> Batch:
+        """The runs as arrays; `duration` cuts them short, s."""
+        shared = self.shared()
+        if duration is not None:
+            shared = shared[: max(2, round(duration / self.period))]
+        fixed = np.array([self._constants(run) for run in runs]).T
+        names = [d.name for d in self.problem.machine.disturbances]
+        t = self.times(shared.shape[0])
+        courses = [[run.scenario.disturbances.get(name, self._middle(name)) for name in names] for run in runs]
+        x, z = self.starts(fixed, [run.scenario for run in runs])
+        return Batch(
+            fixed=fixed, seeds=np.array([seed_of(run.scenario.seed) for run in runs], dtype=np.uint64), x=x, z=z,
+            shared=shared,
+            own=lambda run, first, size: np.stack([course_at(c, t[first : first + size]) for c in courses[run]]),
+        )  # fmt: skip
+
+    def _middle(self, name: str) -> Any:
+        span = self.problem.disturbance(name)
+        return ((0.0, (span.low + span.high) / 2),)
+
+    def _constants(self, run: Run) -> Array:
+        """The constants of a run, in the order of `layout.py`."""
+        s, columns = run.scenario, []
+        random = s.noise * (1 - abs(s.bias)) * (1 - s.quantisation)
+        for part in self.parts:
+            plant, bounds = part.law.plant, np.array([part.noise[i] for i in part.noisy])
+            fault = s.faults.get(part.name, SOUND)
+            columns += [
+                np.asarray(run.gains[part.name]),
+                [s.parameter(part.name, name, p) for name, p in plant.parameters.items()],
+                bounds * random, bounds * s.bias * (1 - s.quantisation),
+                2 * s.quantisation * np.array(part.noise), fault.column(len(plant.inputs)),
+            ]  # fmt: skip
+        return np.concatenate([np.asarray(column, dtype=float) for column in columns])
+
+    def starts(self, fixed: Array, scenarios: Sequence[Scenario]) -> tuple[Array, Array]:
+        """States and discrete states at the first tick, for constants of shape (f, lanes).
+
+        Every member starts nearest to rest inside its assumed initial errors; the scenario places the first one.
+        """
+        first, lanes = self.shared()[0], fixed.shape[1]
+        x = np.zeros((size_of(self.parts, "x"), lanes))
+        z = np.zeros((size_of(self.parts, "z"), lanes))
+        shares = np.array([scenario.initial for scenario in scenarios])
+        n = len(self.parts)
+        for k, (part, member) in enumerate(zip(self.parts, self.problem.members, strict=True)):
+            own, r = np.zeros((len(member.plant.states), lanes)), first[4 * k : 4 * k + 4]
+            initial = member.bounds.initial
+            own[0] = r[0] + initial[0] * shares
+            load = [first[4 * n + k]] if self.problem.foreseeing else [
+                member.bounds.nominal[name] for name in member.plant.disturbances
+            ]  # fmt: skip
+            gains = part.constants(fixed)["gains"]
+            reference = np.repeat(r[:, None], lanes, axis=1)
+            for i in range(1, len(own)):
+                target = self._targets(k, own, reference, gains, load)[i]
+                own[i] = target + np.clip(-target, -initial[i], initial[i])
+            x[part.x] = own
+            discrete = part.discrete(z)
+            discrete["law"][:] = np.reshape(
+                np.array([part.law.start(column.tolist()) for column in own.T]).T, (part.law.states, lanes)
+            )
+            if part.observed:
+                # an observer starts from its first measurement and the reference's speed
+                discrete["observer"][0], discrete["observer"][1] = own[0], r[1]
+        return x, z
+
+    def _targets(self, k: int, x: Array, r: Array, gains: Array, load: Sequence[float]) -> Array:
+        """What each state of a member tracks; nothing but the reference where its law is a rival. Shape (n, lanes)."""
+        member = self.problem.members[k]
+        if self.parts[k].law is not member.law:
+            gains = np.repeat(np.array([[item.low for item in member.ranges]]).T, x.shape[1], axis=1)
+        if k not in self._goals:
+            self._goals[k] = _targets_of(member.law)
+        return np.array(self._goals[k](x, r, gains, load))
+
+
+def _targets_of(law: Any) -> Any:
+    """CasADi function (x, r, gains, load) -> target of each row, adaptive scalars at zero."""
+    import casadi as ca
+
+    plant = law.plant
+    x, r = ca.SX.sym("x", len(plant.states)), ca.SX.sym("r", 4)
+    gains, load = ca.SX.sym("gains", len(law.schema)), ca.SX.sym("load", plant.w.numel())
+    nominal = ca.DM(list(plant.values().values()))
+    virtual, _ = law.virtual_controls(x, r, ca.SX.zeros(law.states), gains, nominal, load)
+    goals = [r[0] if t == "reference" else 0 if t == "zero" else virtual[int(t)] for t in plant.targets]
+    return ca.Function("targets", [x, r, gains, load], [ca.vertcat(*goals)])
+
+
+def seed_of(seed: int) -> int:
+    """A seed of the draws: neighbouring numbers give unrelated streams."""
+    return int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])

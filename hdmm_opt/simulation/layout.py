@@ -1,0 +1,126 @@
+"""Where everything of a loop lies: symbols and slices of its states and constants, member by member.
+
+Discrete states, member by member: those of the law, commanded input, applied input, errors, and those of the observer.
+Constants of a run: by member gains, parameters, spread and offset of the noisy states, quantisation steps, and the
+fault's share, start, rate and stuck input. Shared columns: each reference with three derivatives, then foreseen loads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..control import Law
+from ..control.observer import STATES
+from ..problem import Problem
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """One member in the loop.
+
+    Attributes:
+        index: Its place in the machine.
+        name: Its name.
+        law: Its law.
+        every: It runs at each tick whose number is a multiple of this.
+        period: Its control period, s.
+        noise: Bounds on its measurement errors. Shape (n,).
+        observed: Whether an observer estimates its position and speed.
+        errors: Number of errors that its law shows.
+        x, z, draws, fixed: Slices of its states, discrete states, random draws and constants.
+    """
+
+    index: int
+    name: str
+    law: Law
+    every: int
+    period: float
+    noise: tuple[float, ...]
+    observed: bool
+    errors: int
+    x: slice
+    z: slice
+    draws: slice
+    fixed: slice
+
+    @property
+    def noisy(self) -> list[int]:
+        """Indices of the states whose measurement is not exact."""
+        return [i for i, bound in enumerate(self.noise) if bound > 0]
+
+    def cut(self, column: Any, sizes: Mapping[str, int]) -> dict[str, Any]:
+        """Named pieces of a column, symbols or numbers."""
+        found, first = {}, 0
+        for name, size in sizes.items():
+            found[name] = column[first : first + size]
+            first += size
+        return found
+
+    def discrete(self, z: Any) -> dict[str, Any]:
+        """Its discrete states by name: law, commanded, applied, errors, observer."""
+        return self.cut(z[self.z], self.discrete_sizes)
+
+    def constants(self, fixed: Any) -> dict[str, Any]:
+        """Its constants by name: gains, parameters, spread, offset, grid, fault."""
+        return self.cut(fixed[self.fixed], self.constant_sizes)
+
+    @property
+    def discrete_sizes(self) -> dict[str, int]:
+        """Sizes of its discrete states."""
+        inputs = len(self.law.plant.inputs)
+        return {"law": self.law.states, "commanded": inputs, "applied": inputs, "errors": self.errors,
+                "observer": STATES if self.observed else 0}  # fmt: skip
+
+    @property
+    def constant_sizes(self) -> dict[str, int]:
+        """Sizes of its constants."""
+        plant, noisy = self.law.plant, len(self.noisy)
+        return {"gains": len(self.law.schema), "parameters": len(plant.parameters), "spread": noisy, "offset": noisy,
+                "grid": len(plant.states), "fault": 3 + len(plant.inputs)}  # fmt: skip
+
+
+def parts_of(problem: Problem, laws: Sequence[Law], period: float) -> list[Part]:
+    """The members in the loop, at a tick of the shortest period.
+
+    Args:
+        problem: The problem.
+        laws: A law for each member; those of the problem or rivals.
+        period: Duration of a tick, s.
+
+    A member's period is a multiple of the tick; a shorter one becomes the tick itself.
+    """
+    made: list[Part] = []
+    starts: dict[str, int] = dict.fromkeys(("x", "z", "draws", "fixed"), 0)
+    for k, (member, law) in enumerate(zip(problem.members, laws, strict=True)):
+        own = max(member.bounds.period, period)
+        every = round(own / period)
+        observed = member.name in problem.observers
+        noise = member.bounds.noise if not observed else (member.bounds.noise[0], 0.0, *member.bounds.noise[2:])
+        nothing = slice(0, 0)
+        part = Part(
+            index=k, name=member.name, law=law, every=every, period=every * period, noise=noise, observed=observed,
+            errors=errors_of(law), x=nothing, z=nothing, draws=nothing, fixed=nothing,
+        )  # fmt: skip
+        sizes = {"x": len(law.plant.states), "z": sum(part.discrete_sizes.values()), "draws": len(part.noisy),
+                 "fixed": sum(part.constant_sizes.values())}  # fmt: skip
+        places = {key: slice(starts[key], starts[key] + size) for key, size in sizes.items()}
+        made.append(Part(**{**part.__dict__, **places}))
+        starts = {key: starts[key] + size for key, size in sizes.items()}
+    return made
+
+
+def errors_of(law: Law) -> int:
+    """Number of errors that a law shows."""
+    import casadi as ca
+
+    plant = law.plant
+    x, r, z = ca.SX.sym("x", len(plant.states)), ca.SX.sym("r", 4), ca.SX.sym("z", law.states)
+    gains, p, w = ca.SX.sym("g", len(law.schema)), ca.SX.sym("p", plant.p.numel()), ca.SX.sym("w", plant.w.numel())
+    return law.step(x, r, z, gains, p, w, 1.0)[2].numel()
+
+
+def size_of(parts: Sequence[Part], key: str) -> int:
+    """Length of a group of symbols."""
+    return getattr(parts[-1], key).stop

@@ -1,0 +1,114 @@
+"""Figures of a simulated run, as records that every engine accumulates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..problem import Problem
+from .engine.system import Record
+from .layout import Part
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What the figures are measured by.
+
+    Attributes:
+        transient: Time that error figures leave out, s.
+        band: Required error of the output for the settling time, m.
+    """
+
+    transient: float
+    band: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signals:
+    """What records are made of, as expressions, member by member.
+
+    Attributes:
+        states, errors, commanded, outputs, estimates: Of each member.
+        apart: Distance of the output from its reference.
+        t, tau: Time of the tick and since the tick, s.
+    """
+
+    states: list[Any]
+    errors: list[Any]
+    commanded: list[Any]
+    outputs: list[dict[str, Any]]
+    estimates: list[Any]
+    apart: Any
+    t: Any
+    tau: Any
+
+
+def records(problem: Problem, parts: Sequence[Part], settings: Settings, signals: Signals) -> tuple[Record, ...]:
+    """Records of the output, then of each member, named "figure member"."""
+    import casadi as ca
+
+    late, apart = signals.t >= settings.transient, signals.apart
+    found = [
+        Record(name="late", kind="max", value=ca.if_else(late, apart, 0), between=True),
+        Record(name="error", kind="max", value=apart, between=True),
+        Record(name="outside", kind="max", value=ca.if_else(apart > settings.band, signals.t, -1)),
+        Record(name="squares", kind="sum", value=ca.if_else(late, apart**2, 0)),
+        Record(name="itae", kind="sum", value=signals.t * apart),
+        Record(name="ever outside", kind="max", value=apart > settings.band),
+    ]
+    for i, part in enumerate(parts):
+        found += _of_member(part, signals, i, late)
+        if part.observed:
+            found += _estimates(part, signals, i)
+    return tuple(found)
+
+
+def _of_member(part: Part, signals: Signals, i: int, late: Any) -> list[Record]:
+    import casadi as ca
+
+    plant, name, error = part.law.plant, part.name, ca.fabs(signals.errors[i])
+    named = {s: signals.states[i][k] for k, s in enumerate(plant.states)}
+    named |= {s: signals.commanded[i][k] for k, s in enumerate(plant.inputs)}
+    use = ca.SX(0)
+    for limit in plant.limits:
+        use = ca.fmax(use, _norm([named[s] for s in limit.signals]) / limit.value)
+    size = _norm([signals.commanded[i][k] for k in range(len(plant.inputs))])
+    found = [
+        Record(name=f"error {name}", kind="max", value=error, between=True),
+        Record(name=f"late {name}", kind="max", value=ca.if_else(late, error, 0), between=True),
+        Record(name=f"squares {name}", kind="sum", value=ca.if_else(late, error**2, 0)),
+        Record(name=f"use {name}", kind="max", value=use, between=True),
+        Record(name=f"input {name}", kind="max", value=size),
+    ]
+    for output, value in signals.outputs[i].items():
+        if output == "power":
+            found.append(Record(name=f"sum {output} {name}", kind="sum", value=value))
+            continue
+        found.append(Record(name=f"peak {output} {name}", kind="max", value=ca.fabs(value)))
+        found.append(Record(name=f"squares {output} {name}", kind="sum", value=value**2))
+    return found
+
+
+def _estimates(part: Part, signals: Signals, i: int) -> list[Record]:
+    """The errors of an observer, where what it foresaw for the end of a period has come."""
+    import casadi as ca
+
+    tick = part.period / part.every
+    ended = signals.tau > (1 - 1e-6) * tick
+    if part.every > 1:
+        cycles = (signals.t + signals.tau) / part.period
+        ended = ca.logic_and(ended, ca.fabs(cycles - ca.floor(cycles + 0.5)) < 1e-6)
+    return [
+        Record(
+            name=f"estimated {what} {part.name}", kind="max", between=True,
+            value=ca.if_else(ended, ca.fabs(signals.states[i][k] - signals.estimates[i][k]), 0),
+        )
+        for k, what in enumerate(("position", "speed"))
+    ]  # fmt: skip
+
+
+def _norm(parts: list[Any]) -> Any:
+    import casadi as ca
+
+    return ca.fabs(parts[0]) if len(parts) == 1 else ca.sqrt(sum(part**2 for part in parts))

@@ -1,0 +1,64 @@
+"""The law of a study, and how its gains are searched."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from .messages import refused
+from .sections import GainSection, Name, NonNegative, Positive, Section
+
+Rate = Annotated[float, Field(gt=0, le=1e5)]
+
+
+class ObserverSection(Section):
+    """A motion-state observer for every member: position is measured, speed is not (P-4)."""
+
+    bandwidth_rad_s: Positive
+    largest: NonNegative = 0.1
+    epsilon: NonNegative = 0.0
+    sigma: Positive = 10.0
+
+
+class ControllerSection(Section):
+    """The law of every member, its rate and gains; `members` and `rates_hz` hold what differs from one to another."""
+
+    law: Annotated[str, Field(pattern="^[a-z][a-z0-9_]*$", max_length=40)]
+    modelling: tuple[Literal["mechanics", "friction", "resistance", "back_emf", "decoupling"], ...] = ()
+    rate_hz: Rate
+    rates_hz: dict[Name, Rate] = Field(default_factory=dict)
+    gains: dict[str, GainSection] = Field(default_factory=dict)
+    members: dict[Name, dict[str, GainSection]] = Field(default_factory=dict)
+    observer: ObserverSection | None = None
+
+    def rate_of(self, member: str) -> float:
+        """Control rate of a member, Hz."""
+        return self.rates_hz.get(member, self.rate_hz)
+
+
+class WeightSection(Section):
+    """Weights of the closed-loop cost."""
+
+    rms_error: NonNegative = 1.0
+    certified_bound: NonNegative = 1.0
+    itae: NonNegative = 0.2
+    effort: NonNegative = 0.2
+
+    @model_validator(mode="after")
+    def _some(self) -> WeightSection:
+        if not self.rms_error + self.certified_bound + self.itae + self.effort > 0:
+            rule = "needs one weight above zero: got none"
+            raise refused("", rule, "give rms_error or certified_bound a weight")
+        return self
+
+
+class TuningSection(Section):
+    """Search budget of the second stage."""
+
+    method: Literal["jaya", "tlbo", "random", "gradient"] = "jaya"
+    population: Annotated[int, Field(ge=4, le=500)] = 20
+    iterations: Annotated[int, Field(ge=0, le=10_000)] = 20
+    seconds: Positive | None = None
+    seed: Annotated[int, Field(ge=0)] = 1
+    weights: WeightSection = WeightSection()

@@ -1,0 +1,65 @@
+"""The machine of a study, and what is uncertain about it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from ..errors import RefusedKeyError
+from ..machines.registry import model
+from .messages import refused
+from .sections import LimitSection, Name, NonNegative, Pair, ParameterSection, Section
+
+
+class DriveSection(Section):
+    """The numbers of one member: parameters and limits by name, stroke, and how weak its actuator may become."""
+
+    parameters: dict[str, ParameterSection] = Field(default_factory=dict)
+    limits: dict[str, LimitSection] = Field(default_factory=dict)
+    stroke: Pair | None = None
+    least_effectiveness: Annotated[float, Field(ge=0, le=1)] | None = None
+
+
+class PlantSection(Section):
+    """The machine by name, and its numbers where they are not the bundled ones."""
+
+    model: str
+    level: str | None = None
+    urdf: str | None = None
+    tip_m: tuple[float, float, float] | None = None
+    damping: NonNegative | None = None
+    least_lever_m_rad: Annotated[float, Field(gt=0, le=0.25)] | None = None
+    parameters: dict[str, ParameterSection] = Field(default_factory=dict)
+    joints: dict[Name, DriveSection] = Field(default_factory=dict)
+    locked: dict[Name, float] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _fitting(self) -> PlantSection:
+        try:
+            model(self.model).check(self)
+        except RefusedKeyError as error:
+            raise refused(error.key, error.rule, error.remedy) from None
+        return self
+
+
+class DisturbanceSection(Section):
+    """The range of something from outside; constant in a run, or of any course."""
+
+    range: Pair
+    course: Literal["constant", "any"] | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> DisturbanceSection:
+        low, high = self.range
+        if low > high:
+            raise refused("range", f"needs lower <= upper: got [{low:g}, {high:g}]", "swap or correct them")
+        return self
+
+
+class UncertaintySection(Section):
+    """What the proof covers besides parameter tolerances: disturbances, measurement errors, initial errors."""
+
+    disturbances: dict[Name, DisturbanceSection] = Field(default_factory=dict)
+    noise: dict[str, NonNegative] = Field(default_factory=dict)
+    initial: dict[str, NonNegative] = Field(default_factory=dict)

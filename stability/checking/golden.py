@@ -1,0 +1,54 @@
+"""Golden vectors follow from the gains and the law, to float accuracy."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from .claim import Claim
+from .forms import walk
+from .limits import need
+from .parsing import numbers
+
+
+def golden_agree(vectors: Any, claim: Claim) -> bool:
+    """The recorded input/output vectors follow from the gains and the law, to float accuracy."""
+    need(isinstance(vectors, list) and 20 <= len(vectors) <= 100, "golden must hold 20 to 100 vectors")
+    return all(_golden_one(vector, claim) for vector in vectors)
+
+
+def _golden_one(vector: dict[str, Any], claim: Claim) -> bool:
+    n, k = len(claim.rows), len(claim.controlled)
+    x, r, theta = (
+        [float(v) for v in numbers(vector[key], count, "golden")] for key, count in (("x", n), ("r", 4), ("theta", k))
+    )
+    named = {row["state"]: value for row, value in zip(claim.rows, x, strict=True)}
+    named |= {f"r{j}": value for j, value in enumerate(r)}
+    named |= {f"nominal.{name}": float(value) for name, value in claim.nominal.items()}
+    foreseen = numbers(vector.get("load", []), len(claim.feedforward), "golden")
+    named |= {f"nominal.{name}": float(value) for name, value in zip(claim.feedforward, foreseen, strict=True)}
+    virtual: dict[int, float] = {}
+    following: list[float] = []
+    for j, i in enumerate(claim.controlled):
+        target = claim.rows[i]["target"]
+        goal = r[0] if target == "reference" else 0.0 if target == "zero" else virtual[target]
+        beta, epsilon, delta, sigma = (float(g) for g in claim.gains[j])
+        error, program = x[i] - goal, claim.law[j]
+        term = walk(program, named.__getitem__, float, float_apply)[program["outputs"][0]]
+        virtual[i] = -(beta + epsilon * theta[j]) * error / 2 + term
+        step = epsilon * delta * error * error / 2 - delta * sigma * theta[j]
+        following.append(theta[j] + float(claim.period) * step)
+    wanted = [virtual[row] for row in claim.input_map]
+    norm, limit = math.hypot(*wanted), float(claim.limits[0]["value"])
+    wanted = [value * (limit / max(norm, limit)) for value in wanted]
+    pairs = list(zip(wanted, numbers(vector["u"], len(wanted), "golden"), strict=True))
+    pairs += zip(following, numbers(vector["theta_next"], k, "golden"), strict=True)
+    return all(math.isfinite(a) and abs(a - float(b)) <= 1e-8 * (1.0 + abs(a)) for a, b in pairs)
+
+
+def float_apply(operator: str, a: float, b: float = 0.0) -> float:
+    """Operations in floats."""
+    simple = {"add": a + b, "sub": a - b, "mul": a * b, "neg": -a, "sq": a * a}
+    if operator in simple:
+        return simple[operator]
+    return a / b if operator == "div" else math.tanh(a) if operator == "tanh" else math.sqrt(a)

@@ -1,0 +1,57 @@
+"""What a gain file must prove, and how large it may be.
+
+Must fail: an obligation left out, another law or kind of certificate, a file beyond these sizes.
+"""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+
+#: What must be proved of every member whatever its law.
+COMMON = ("non-vacuity", "reference", "invariance", "authority", "sampling", "adaptation", "rounding", "accuracy")
+SCHEMA = "hdmm-opt/gains/2"
+#: What must be proved of each member for its law and its kind of certificate; a file that leaves one out is refused.
+REQUIRED = {
+    "rac": {
+        "composition": ("composition", *COMMON),
+        "sampled": ("contraction", *COMMON),
+    }
+}
+#: What must be proved beside it where members push each other, and where an observer stands for a measured speed.
+COUPLED, OBSERVED = ("guarantees", "motion", "loads", "coupling", "output"), ("guarantees", "observer")
+#: Vectors of each kind of certificate.
+VECTORS = {"composition": ("weights", "young", "leak"), "sampled": ("reach", "start", "shape")}
+MAX_BYTES, MAX_DIGITS, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 20_000_000, 300, 12_000, 8, 5_000
+#: Cells of a sampled certificate, digits of its numbers, and (vertices + 8) n³ summed over its cells.
+MAX_CELLS, MAX_CELL_DIGITS, MAX_VERTICES = 64, 60, 40_000
+#: Interval products that one member and the coupling of a machine may take; a file of ours takes a tenth of it.
+MAX_PRODUCTS, MAX_COUPLED = 100_000, 20_000_000
+#: Members of a machine, and slices of time that its motion may be cut into.
+MAX_MEMBERS, MAX_SLICES = 8, 4_000
+#: Names of the parameter that holds a member's own part of the bodies' inertia.
+CARRIED = ("load_mass", "load_inertia")
+#: Parts of the ranges of speed and load in which the answer of an acceleration to a load is bounded.
+SPEED_PARTS, LOAD_PARTS = 48, 4
+#: Relative width given to every gain, so that the proof holds for its decimal, its float64 and its float32.
+ROUNDING = Fraction(1, 2**23)
+BITS, MAX_SHIFT = 96, 3_000
+#: Fixed-point bits of matrix exponentials, terms of their series, largest norm, and a bound on all their errors.
+FIXED, TERMS, MAX_NORM, FIXED_ERROR = 192, 120, 20, Fraction(1, 2**100)
+#: Fractional bits of the fixed-point intervals of a coupling, and bits beyond which nothing is proved.
+SCALE, MAX_FIXED = 160, 4_000
+NAME, NUMBER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}"), re.compile(r"-?[0-9]+(/[0-9]+|(\.[0-9]+)?([eE][+-]?[0-9]+)?)")
+
+
+class UnreadableError(Exception):
+    """The file is not a well-formed gain file."""
+
+
+class NotProvedError(Exception):
+    """A bound does not exist."""
+
+
+def need(condition: bool, message: str) -> None:
+    """Raise `UnreadableError` unless the condition holds."""
+    if not condition:
+        raise UnreadableError(message)

@@ -1,0 +1,92 @@
+"""The motion of all members over slices of time.
+
+Theorem: Bezier points by blossoms hold a spline's piece (Ramshaw 1989). Obligation: motion. Must fail: knots that
+differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+from .arithmetic import ONE, Interval, down, up
+from .limits import MAX_SLICES, need
+from .member import Member
+from .parsing import index, number
+
+
+def cut(a: Interval, count: int) -> list[Interval]:
+    """Parts of an interval that cover it."""
+    ends = [a[0] + (a[1] - a[0]) * Fraction(k, count) for k in range(count + 1)]
+    return list(pairwise(ends))
+
+
+def motion_of(member: Member) -> None:
+    """Refuse a member whose first two states are not a position and its rate, or whose law does not know the rate.
+
+    Where a speed comes first nothing else is asked: its rate is what the plant says.
+    """
+    claim = member.claim
+    if claim.first == "speed":
+        return
+    operations, outputs = claim.plant["operations"], claim.plant["outputs"]
+    kinematic = operations[outputs[len(claim.rows)]] == ["input", claim.rows[1]["state"]]
+    need(kinematic and member.loop.mass[0] == ONE, f"{member.name}: the first state's rate is not the second state")
+    need(claim.rows[1]["target"] == 0, f"{member.name}: the second state does not follow the first")
+    term = claim.law[0]
+    rate = term["operations"][term["outputs"][0]] == ["input", "r1"]
+    need(rate, f"{member.name}: the first modelling term is not the reference's rate")
+
+
+def slices(together: list[Any], halvings: Any) -> Iterable[list[list[Interval]]]:
+    """Ranges of position … jerk of every member over slices of time: pieces between knots, each halved some times."""
+    parts = 2 ** index(halvings, 9, "halvings")
+    need(len({len(segments) for segments in together}) == 1, "the references of the members have different segments")
+    count = 0
+    for segments in zip(*together, strict=True):
+        knots = [number(k, "a knot") for k in segments[0]["knots"]]
+        for segment in segments[1:]:
+            need(segment["knots"] == segments[0]["knots"], "the references of the members have different knots")
+        points = [[number(c, "a coefficient") for c in segment["coefficients"]] for segment in segments]
+        for span in range(5, len(knots) - 6):
+            low, high = knots[span], knots[span + 1]
+            if low == high:
+                continue
+            pieces = 1 if len(points[0]) == 6 else parts
+            for k in range(pieces):
+                ends = low + (high - low) * Fraction(k, pieces), low + (high - low) * Fraction(k + 1, pieces)
+                count += 1
+                need(count <= MAX_SLICES, f"the motion is cut into more than {MAX_SLICES} slices")
+                yield [ranges_on(knots, own, span, ends) for own in points]
+
+
+def ranges_on(
+    knots: list[Fraction], points: list[Fraction], span: int, ends: tuple[Fraction, Fraction]
+) -> list[Interval]:
+    """Hulls of the Bezier points of position … jerk of a spline on a part of a span, by blossoms (Ramshaw 1989)."""
+    degree = 5
+    curve = [
+        blossom(knots, points, span, [ends[0]] * (degree - k) + [ends[1]] * k) for k in range(degree + 1)
+    ]  # fmt: skip
+    found = []
+    for order in range(4):
+        found.append((down(min(curve)), up(max(curve))))
+        curve = [(degree - order) * (b - a) / (ends[1] - ends[0]) for a, b in pairwise(curve)]
+    return found
+
+
+def blossom(knots: list[Fraction], points: list[Fraction], span: int, arguments: list[Fraction]) -> Fraction:
+    """The symmetric multi-affine form of a spline's piece."""
+    degree = len(arguments)
+    values = points[span - degree : span + 1]
+    for level, t in enumerate(arguments):
+        following = []
+        for j in range(degree - level):
+            first = knots[span - degree + level + 1 + j]
+            last = knots[span + 1 + j]
+            share = (t - first) / (last - first)
+            following.append(values[j] + share * (values[j + 1] - values[j]))
+        values = following
+    return values[0]

@@ -1,0 +1,89 @@
+"""A sampled motion-state observer, bounded by a comparison system of two rows.
+
+Obligation: observer. Must fail: a slower observer, a worse encoder, another pole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from .arithmetic import magnitude, up
+from .coupling import guarantee_of
+from .limits import ROUNDING, NotProvedError, need
+from .member import Member
+from .motion import motion_of
+from .obligation import Obligation, decided
+from .parsing import number
+
+
+@dataclass(frozen=True)
+class Observer:
+    """A sampled motion-state observer with one adaptive scalar, and the coordinates that prove it."""
+
+    first: Fraction
+    second: Fraction
+    largest: Fraction
+    period: Fraction
+    pole: Fraction
+
+    def errors(self, noise: Fraction, acceleration: Fraction, initial: Fraction) -> tuple[Fraction, Fraction]:
+        """Bounds on the errors of position and speed at every sample.
+
+        In y_1 = e_1, y_2 = e_2 + k e_1 the errors obey |y(t + T)| <= A |y| + b; R = (I - A)^-1 b is not left, and
+        neither is any multiple of it that holds the start.
+        """
+        t, middle, spread = self.period, 1 + self.largest / 2, self.largest / 2
+        inflate = 1 + ROUNDING
+        k = (1 - middle * self.first - self.pole) / t
+        inward = (self.first, self.second + k * self.first)
+        a11, a12 = abs(1 - middle * self.first - k * t) + spread * abs(inward[0]), t
+        a21 = abs(-middle * inward[1] + k - k * (1 + k * t)) + spread * abs(inward[1])
+        a22 = abs(1 + k * t)
+        factor = (1 + self.largest) * noise
+        b1 = factor * abs(inward[0]) + acceleration * t * t / 2
+        b2 = factor * abs(inward[1]) + acceleration * t * (1 + abs(k) * t / 2)
+        determinant = (1 - a11) * (1 - a22) - a12 * a21
+        if not (a11 < 1 and a22 < 1 and determinant > 0):
+            raise NotProvedError("the observer does not contract for every value of its adaptive scalar")
+        reach = [((1 - a22) * b1 + a12 * b2) / determinant, (a21 * b1 + (1 - a11) * b2) / determinant]
+        start = [noise, initial + abs(k) * noise]
+        need(min(reach) > 0, "an observer without any error proves nothing")
+        widest = max(Fraction(1), *(s / r for s, r in zip(start, reach, strict=True)))
+        reach = [up(widest * r * inflate) for r in reach]
+        return reach[0], up(reach[1] + abs(k) * reach[0])
+
+
+def observer_of(data: dict[str, Any], member: Member) -> Observer:
+    """The observer of a member: what it is from the study, its gains and the coordinates of its proof from the file."""
+    section = next(m for m in data["members"] if m["name"] == member.name)["observer"]
+    first, second, pole = (number(section[key], f"the observer's {key}") for key in ("first", "second", "pole"))
+    largest = number(data["study"]["controller"]["observer"]["largest"], "the observer's largest")
+    need(first > 0 and second > 0 and largest >= 0, "the observer's gains must be positive")
+    return Observer(first, second, largest, member.claim.period, pole)
+
+
+def observed(data: dict[str, Any], members: list[Member]) -> Obligation:
+    """The assumed measurement errors have room for the errors of the observers."""
+    found = []
+    noise = data["study"]["uncertainty"].get("noise", {})
+    for member in members:
+        claim = member.claim
+        encoder = number(noise.get(claim.rows[0]["state"], Fraction(0)), "the encoder's error")
+        motion_of(member)
+        need(claim.first == "position", "an observer estimates a position and its rate")
+        acceleration = guarantee_of(data, member.name)[2] + claim.period * magnitude(claim.reference[3])
+        # |v(0) - r'(0)| where |Q_2(0)| and |Q_1(0)| are bounded
+        start = claim.initial[1] + member.loop.gain[0].beta[1] / 2 * claim.initial[0]
+        position, speed = observer_of(data, member).errors(encoder, acceleration, start)
+        found += [room_for(claim.noise[0], position), room_for(claim.noise[1], speed)]
+    statement = "the errors of every observer are inside the assumed measurement errors"
+    return decided("observer", statement, min(found), "1", "an observer that is faster, or a better encoder")
+
+
+def room_for(assumed: Fraction, error: Fraction) -> Fraction:
+    """Room relative to what is assumed; where both are the same number there is room enough."""
+    if assumed < error:
+        return -Fraction(1)
+    return (assumed - error) / assumed + Fraction(1, 10**12) if assumed > 0 else Fraction(1)

@@ -1,0 +1,224 @@
+"""Reads what a file says of a member, and refuses what is not the study's.
+
+Must fail: an assumption narrower than the study, a gain outside its range, a law that reads what it cannot know, a
+plant that does not feel what the study states.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from fractions import Fraction
+from typing import Any
+
+from .arithmetic import Interval, magnitude
+from .claim import Claim, cell_of
+from .limits import CARRIED, MAX_CELLS, MAX_ROWS, NAME, REQUIRED, VECTORS, UnreadableError, need
+from .parsing import index, number, numbers, reads, valid_program
+from .reference import reference_bounds
+
+
+def read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
+    """Read and cross-check the statement about a member: study, assumptions, gains, model, certificate."""
+    try:
+        return _read(data, entry, coupled)
+    except (KeyError, TypeError, AttributeError, IndexError) as error:
+        raise UnreadableError(f"a part of the gain file is missing or has the wrong type: {error}") from None
+
+
+def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
+    study, certificate, model = data["study"], entry["certificate"], entry["model"]
+    controller, section = study["controller"], study["plant"]["joints"][entry["name"]]
+    law = controller["law"]
+    need(law in REQUIRED, f"unknown law {law!r:.40}; known: {', '.join(REQUIRED)}")
+    kind = certificate["kind"]
+    need(kind in REQUIRED[law], f"unknown certificate kind {kind!r:.40}; known: {', '.join(REQUIRED[law])}")
+    rows, controlled, input_map = rows_of(model)
+    need(model["first"] in ("position", "speed"), "the first state is a position or a speed")
+    n, m, states = len(rows), len(model["inputs"]), [row["state"] for row in rows]
+    plant = valid_program(model["plant"], "the plant")
+    terms = [valid_program(term, "a modelling term") for term in model["law"]]
+    need(len(plant["outputs"]) == 2 * n and len(terms) == len(controlled), "the model does not fit the rows")
+    assumed = assumptions(entry["assumptions"], study, section, states, coupled)
+    nominal = {name: number(value, "a nominal value") for name, value in entry["nominal"].items()}
+    limits = limits_of(model, section, states)
+    check_names(model, plant, terms, assumed, nominal, limits, states)
+    watched = controller.get("observer") is not None
+    need(("observer" in entry) == watched, "members have an observer where the study asks for one, and only there")
+    rate = number(controller.get("rates_hz", {}).get(entry["name"], controller["rate_hz"]), "rate_hz")
+    transient = number(study["validation"]["transient_s"], "transient_s")
+    need(rate > 0 and transient >= 0, "the control rate must be positive, the transient not negative")
+    split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]] if kind == "sampled" else []
+    cells = [cell_of(cell, n) for cell in certificate["cells"]] if kind == "sampled" else []
+    covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod(split)
+    need(kind != "sampled" or covered, "the cells do not cover the inertias")
+    stroke = numbers(section["stroke"], 2, "stroke")
+    return Claim(
+        name=entry["name"], rows=rows, input_map=input_map, inputs=model["inputs"], plant=plant, law=terms,
+        parameters=assumed["parameter"], disturbances=assumed["disturbance"], nominal=nominal,
+        reference=reference_bounds(entry["reference"]),
+        noise=[magnitude(assumed["noise"][s]) for s in states],
+        initial=[magnitude(assumed["initial"][s]) for s in states],
+        period=1 / rate, gains=gains_of(entry["gains"], controlled, study, entry["name"]), kind=kind,
+        decay=number(certificate["decay"], "decay"),
+        vectors={name: numbers(certificate[name], n, name) for name in VECTORS[kind] if kind == "composition"},
+        split=split, cells=cells, half_widths=numbers(certificate["half_widths"], n, "half_widths"),
+        input_bound=numbers(certificate["input_bound"], m, "input_bound"),
+        ultimate=numbers(certificate["envelope"]["ultimate"], n, "ultimate"),
+        limits=limits, stroke=(stroke[0], stroke[1]), accuracy=accuracy_of(study, entry["name"]),
+        transient=transient,
+        feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
+        first=model["first"],
+    )  # fmt: skip
+
+
+def rows_of(model: dict[str, Any]) -> tuple[list[dict[str, Any]], list[int], list[int]]:
+    """The subsystems, indices of those with gains, and the row of each input."""
+    rows = model["rows"]
+    n, m = len(rows), len(model["inputs"])
+    need(1 <= n <= MAX_ROWS and 1 <= m <= n, f"1 to {MAX_ROWS} rows are needed: got {n}")
+    for i, row in enumerate(rows):
+        target = row["target"]
+        if target not in ("reference", "zero"):
+            row["target"] = index(target, i, "a row's target")
+            need(rows[row["target"]]["controlled"] is True, "a row's target must be a controlled row")
+        need(
+            isinstance(row["controlled"], bool) and isinstance(row["state"], str), "a row needs a state and controlled"
+        )
+        need(printable(row["unit"]), "a row's unit must be printable text")
+    need(rows[0]["target"] == "reference", "the first row must track the reference")
+    controlled = [i for i, row in enumerate(rows) if row["controlled"]]
+    input_map = [index(d, n, "an input's row") for d in model["input_map"]]
+    good = len(input_map) == m and all(rows[d]["controlled"] for d in input_map)
+    need(good, "each input must be the control of a controlled row")
+    return rows, controlled, input_map
+
+
+def limits_of(model: dict[str, Any], section: dict[str, Any], states: list[str]) -> list[dict[str, Any]]:
+    """The study's limits on the signals that the model names for each; the first is the amplitude limit."""
+    limits, given = model["limits"], section["limits"]
+    known = {*states, *model["inputs"]}
+    need(limits and [x["name"] for x in limits] == list(given), "the limits of the model are not those of the study")
+    need(all(x["signals"] and set(x["signals"]) <= known for x in limits), "a limit names an unknown signal")
+    need(all(printable(value["unit"]) for value in given.values()), "a limit's unit must be printable text")
+    need(set(limits[0]["signals"]) == set(model["inputs"]), "the first limit must be the amplitude limit of the inputs")
+    return [
+        {"name": x["name"], "signals": x["signals"], "unit": given[x["name"]]["unit"],
+         "value": number(given[x["name"]]["value"], "a limit")}
+        for x in limits
+    ]  # fmt: skip
+
+
+def check_names(
+    model: dict[str, Any], plant: dict[str, Any], terms: list[dict[str, Any]], assumed: dict[str, dict[str, Interval]],
+    nominal: dict[str, Fraction], limits: list[dict[str, Any]], states: list[str],
+) -> None:  # fmt: skip
+    """Refuse a model that reads what has no assumption, or a law that reads what a controller cannot know."""
+    parameters = assumed["parameter"]
+    need(not set(nominal) & set(assumed["feedforward"]), "a foreseen disturbance has no nominal value")
+    need(reads(plant, plant["outputs"][: len(states)]) <= set(parameters), "an inertia depends on more than parameters")
+    listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], "r0", "r1", "r2", "r3"]
+    for name in (*listed, *nominal, *(str(limit["name"]) for limit in limits)):
+        need(isinstance(name, str) and NAME.fullmatch(name) is not None, "a name must be a plain identifier")
+    need(len(set(listed)) == len(listed), "a name stands for two different signals")
+    need(reads(plant) <= set(listed) - {"r0", "r1", "r2", "r3"}, "the plant reads a name without an assumption")
+    unread = {*parameters, *assumed["disturbance"]} - reads(plant)
+    need(not unread, f"the plant does not use {', '.join(sorted(unread))}, which the study states")
+    foreseen = {*nominal, *assumed["feedforward"]}
+    for term in terms:  # r3, the jerk, has no bounded rate
+        allowed = {*states, "r0", "r1", "r2", *(f"nominal.{name}" for name in foreseen)}
+        need(reads(term) <= allowed, "a modelling term reads what a controller cannot know")
+
+
+def gains_of(
+    entries: list[dict[str, Any]], controlled: list[int], study: dict[str, Any], name: str
+) -> list[tuple[Fraction, ...]]:
+    """β, ε, δ, σ of each controlled row, inside the ranges of the file and of the study."""
+    kinds = ("beta", "epsilon", "delta", "sigma")
+    given = {entry["name"]: number(entry["value"], entry["name"]) for entry in entries}
+    names = [f"{kind}_{k + 1}" for k in range(len(controlled)) for kind in kinds]
+    need(set(given) == set(names) and len(entries) == len(names), "the gains do not fit the subsystems")
+    gains = [tuple(given[f"{kind}_{k + 1}"] for kind in kinds) for k in range(len(controlled))]
+    need(all(b > 0 and e >= 0 and d > 0 and s > 0 for b, e, d, s in gains), "gains must be positive")
+    ranges = study["controller"]["members"][name]
+    for entry in entries:
+        key, value = entry["name"], given[entry["name"]]
+        wanted = ranges[key]
+        low, high = wanted.get("value", wanted.get("min")), wanted.get("value", wanted.get("max"))
+        need((low, high) == (entry["min"], entry["max"]), f"the range of {key} is not the study's")
+        need(number(low, key) <= value <= number(high, key), f"{key} is outside the range of the study")
+    return gains
+
+
+def accuracy_of(study: dict[str, Any], name: str) -> Fraction:
+    """The required bound on a member's error: its own, or where it is the only one that of the machine."""
+    own = study["requirements"].get("member_error", {})
+    need(name in own or len(study["plant"]["joints"]) == 1, f"the study requires no error of {name}")
+    return number(own.get(name, study["requirements"]["tracking_error_m"]), "the required error")
+
+
+def assumptions(
+    entries: list[dict[str, Any]], study: dict[str, Any], section: dict[str, Any], states: list[str], coupled: bool
+) -> dict[str, dict[str, Interval]]:
+    """The assumptions by kind; each must cover what the study states.
+
+    What a coupling does to a member, and what an observer measures, is decided by obligations of their own.
+    """
+    kinds = ("parameter", "disturbance", "noise", "initial", "feedforward", "feedforward_rate")
+    found: dict[str, dict[str, Interval]] = {kind: {} for kind in kinds}
+    for entry in entries:
+        kind, _, name = entry["name"].partition(".")
+        bounds = number(entry["lower"], entry["name"]), number(entry["upper"], entry["name"])
+        need(kind in found and name not in found[kind], f"unknown or doubled assumption {entry['name']!r:.60}")
+        need(bounds[0] <= bounds[1], f"{entry['name']}: lower > upper")
+        found[kind][name] = bounds
+    need(
+        set(found["noise"]) == set(found["initial"]) == set(states), "noise and initial errors are those of the states"
+    )
+    foreseen = set(found["feedforward"])
+    need(foreseen == set(found["feedforward_rate"]), "a foreseen disturbance needs a range and a range of its rate")
+    need(foreseen <= (set(found["disturbance"]) if coupled else set()), "only the load of a coupling is foreseen")
+    stated = stated_ranges(study, section, states, coupled)
+    carried = {name for name in found["parameter"] if coupled and name in CARRIED}
+    listed = {name for kind, name, _, _ in stated if kind == "parameter"}
+    need(listed == set(found["parameter"]) - carried, "the parameters are not those of the study")
+    for kind, name, low, high in stated:
+        need(name in found[kind], f"the assumption {kind}.{name} is missing")
+        bounds = found[kind][name]
+        need(low <= high, f"the study's range of {name} is upside down")
+        need(bounds[0] <= low and high <= bounds[1], f"the assumption {kind}.{name} is narrower than the study's")
+    if not coupled:
+        disturbed = {name for kind, name, _, _ in stated if kind == "disturbance"}
+        need(disturbed == set(found["disturbance"]), "the disturbances are not those of the study")
+    return found
+
+
+def stated_ranges(
+    study: dict[str, Any], section: dict[str, Any], states: list[str], coupled: bool
+) -> list[tuple[str, str, Fraction, Fraction]]:
+    """Kind, name and range of everything that the study states of a member."""
+    uncertainty, stated = study["uncertainty"], []
+    for name, entry in section["parameters"].items():
+        value = number(entry["value"], name)
+        spread = abs(value) * number(entry["tolerance"], name)
+        stated.append(("parameter", name, value - spread, value + spread))
+    if "least_effectiveness" in section:
+        least = number(section["least_effectiveness"], "least_effectiveness")
+        need(0 <= least <= 1, "an actuator delivers between nothing and all of its torque")
+        stated.append(("parameter", "effectiveness", least, Fraction(1)))
+    for name, entry in {} if coupled else uncertainty["disturbances"].items():
+        low, high = numbers(entry["range"], 2, name)
+        stated.append(("disturbance", name, low, high))
+    observed = study["controller"].get("observer") is not None
+    for kind in ("noise", "initial"):
+        given = uncertainty.get(kind, {})
+        for k, state in enumerate(states):
+            value = number(given.get(state, Fraction(0)), f"{kind} of {state}")
+            if kind == "initial" or k > 1 or not observed:
+                stated.append((kind, state, -value, value))
+    return stated
+
+
+def printable(unit: Any) -> bool:
+    """Whether a unit is short printable text."""
+    return isinstance(unit, str) and re.fullmatch(r"[ -~]{1,40}", unit) is not None

@@ -1,0 +1,1 @@
+"""Enclosures: intervals, and the ranges of expressions over boxes."""

@@ -1,0 +1,117 @@
+"""Expressions as data: a CasADi SX function turned into a list of operations that a file can carry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from .interval import Interval
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expression:
+    """A straight-line program.
+
+    Attributes:
+        inputs: Names of the scalar inputs that occur.
+        operations: Each entry is ("input", name), ("const", decimal text) or (operator, index…), where an index
+            points to an earlier entry.
+        outputs: Indices of the entries that are results.
+    """
+
+    inputs: tuple[str, ...]
+    operations: tuple[tuple[Any, ...], ...]
+    outputs: tuple[int, ...]
+
+    def to_data(self) -> dict[str, Any]:
+        """The expression as JSON data."""
+        return {
+            "inputs": list(self.inputs),
+            "operations": [list(operation) for operation in self.operations],
+            "outputs": list(self.outputs),
+        }
+
+    def __call__(self, values: Mapping[str, float]) -> list[float]:
+        """Evaluate in floats.
+
+        Args:
+            values: One number for each input name.
+
+        Returns:
+            The outputs, in order.
+        """
+        table = run(self, lambda name: float(values[name]), _FLOAT, float)
+        return [table[index] for index in self.outputs]
+
+
+def enclose(expression: Expression, ranges: Mapping[str, Interval]) -> list[Interval]:
+    """Enclosures of the outputs over ranges of the inputs, by natural interval evaluation.
+
+    Raises:
+        ZeroDivisionError: a divisor can vanish in the ranges.
+    """
+    table = run(expression, ranges.__getitem__, BOUNDED, Interval)
+    return [table[index] for index in expression.outputs]
+
+
+BOUNDED: dict[str, Callable[..., Interval]] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "neg": lambda a: -a,
+    "sq": Interval.square,
+    "sqrt": Interval.sqrt,
+    "tanh": Interval.tanh,
+    "sin": Interval.sin,
+    "cos": Interval.cos,
+    "exp": Interval.exp,
+    "abs": Interval.abs,
+    "min": Interval.minimum,
+    "max": Interval.maximum,
+}
+
+
+_FLOAT: dict[str, Callable[..., float]] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "neg": lambda a: -a,
+    "sq": lambda a: a * a,
+    "sqrt": math.sqrt,
+    "tanh": math.tanh,
+    "sin": math.sin,
+    "cos": math.cos,
+    "exp": math.exp,
+    "abs": math.fabs,
+    "min": lambda a, b: min(a, b),
+    "max": lambda a, b: max(a, b),
+}
+
+
+def run(
+    expression: Expression, read: Callable[[str], T], operators: Mapping[str, Callable[..., T]], const: Callable[..., T]
+) -> list[T]:
+    """Run the program in any arithmetic; returns the value of every entry.
+
+    Raises:
+        NotImplementedError: an operation that this arithmetic does not have; the message names it.
+    """
+    table: list[T] = []
+    for operator, *arguments in expression.operations:
+        if operator == "input":
+            table.append(read(arguments[0]))
+        elif operator == "const":
+            table.append(const(float(arguments[0])))
+        elif operator not in operators:
+            raise NotImplementedError(
+                f"this needs a model of {', '.join(operators)}: got {operator}; rewrite the model with those"
+            )
+        else:
+            table.append(operators[operator](*(table[index] for index in arguments)))
+    return table

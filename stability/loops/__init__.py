@@ -1,0 +1,1 @@
+"""Loops: plant and law as data, and their error rows."""

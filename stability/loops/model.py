@@ -1,0 +1,108 @@
+"""What a proof is about: the plant and the law as data, the bounds assumed, and the gains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..enclosures.expression import Expression
+from ..enclosures.interval import Interval
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One subsystem, with error Q = x - target.
+
+    Attributes:
+        state: Name of its state.
+        unit: Unit of its state.
+        target: "reference" (r0), "zero", or the index of the row whose virtual control is the target.
+        controlled: True where the RAC law acts in this row; False for an actuator lag.
+    """
+
+    state: str
+    unit: str
+    target: str | int
+    controlled: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopModel:
+    """Plant M_i x_i' = h_i and modelling terms m_i of the law, as operation lists.
+
+    Attributes:
+        rows: The subsystems; a row's target row comes before it.
+        input_map: For each plant input, the row whose virtual control it is.
+        inputs: Names of the plant inputs.
+        plant: Outputs M_1…M_n (constant in time), h_1…h_n; inputs: states, plant inputs, parameters, disturbances.
+        law: One modelling term m_i for each controlled row; inputs: states, r0…r3, ``nominal.NAME``.
+    """
+
+    rows: tuple[Row, ...]
+    input_map: tuple[int, ...]
+    inputs: tuple[str, ...]
+    plant: Expression
+    law: tuple[Expression, ...]
+
+    @property
+    def controlled(self) -> tuple[int, ...]:
+        """Indices of the rows that carry gains."""
+        return tuple(i for i, row in enumerate(self.rows) if row.controlled)
+
+    def to_data(self) -> dict[str, Any]:
+        """The model as JSON data."""
+        return {
+            "rows": [
+                {"state": r.state, "unit": r.unit, "target": r.target, "controlled": r.controlled} for r in self.rows
+            ],
+            "input_map": list(self.input_map),
+            "inputs": list(self.inputs),
+            "plant": self.plant.to_data(),
+            "law": [term.to_data() for term in self.law],
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gains:
+    """Gains of one controlled row (theory §2).
+
+    Attributes:
+        beta: Proportional gain β > 0.
+        epsilon: Adaptation gain ε ≥ 0; 0 switches the adaptation off.
+        delta: Adaptation rate δ > 0.
+        sigma: Leakage σ > 0.
+    """
+
+    beta: float
+    epsilon: float = 0.0
+    delta: float = 1.0
+    sigma: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bounds:
+    """The assumptions of a proof.
+
+    Attributes:
+        parameters: Range of each plant parameter; constant in time.
+        disturbances: Range of each disturbance; arbitrary in time.
+        nominal: Value of each design constant ``nominal.NAME`` of the law.
+        reference: Ranges of r0 (position) … r3 (jerk).
+        noise: Bound on the measurement error of each row's state. Shape (n,).
+        initial: Bound on each |Q_i(0)|. Shape (n,).
+        period: Control period in s; 0 for a continuous law.
+        transient: Time from which on the bound on the tracking error must hold, s.
+        feedforward: Disturbances that the law foresees as they move, ``nominal.NAME``: range, and range of the rate.
+            `disturbances` then holds what the real one may differ from the foreseen one.
+    """
+
+    parameters: Mapping[str, Interval]
+    disturbances: Mapping[str, Interval]
+    nominal: Mapping[str, float]
+    reference: tuple[Interval, Interval, Interval, Interval]
+    noise: tuple[float, ...]
+    initial: tuple[float, ...]
+    period: float
+    transient: float = 0.0
+    feedforward: Mapping[str, tuple[Interval, Interval]] = field(default_factory=dict)

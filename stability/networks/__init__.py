@@ -1,0 +1,1 @@
+"""Networks: members that push each other, proved one by one."""
