@@ -145,6 +145,10 @@ BITS, MAX_SHIFT = 96, 3_000
 FIXED, TERMS, MAX_NORM, FIXED_ERROR = 192, 120, 20, Fraction(1, 2**100)
 #: Fractional bits of the fixed-point intervals of a coupling, and bits beyond which nothing is proved.
 SCALE, MAX_FIXED = 160, 4_000
+#: Bits of the denominators of a reference's numbers.
+MAX_BITS = 400
+#: A unit, such as "kg m^2", "N m" or "rad/s".
+UNIT_TEXT = re.compile(r"[A-Za-z]{1,4}(\^[2-4])?( [A-Za-z]{1,4}(\^[2-4])?){0,3}(/[A-Za-z]{1,4}(\^[2-4])?)?")
 NAME, NUMBER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}"), re.compile(r"-?[0-9]+(/[0-9]+|(\.[0-9]+)?([eE][+-]?[0-9]+)?)")
 
 
@@ -212,9 +216,9 @@ class Work:
         """Allow so many products from here on."""
         self.left = allowed
 
-    def one(self) -> None:
-        """Count a product."""
-        self.left -= 1
+    def one(self, cost: int = 1) -> None:
+        """Count a product, or what costs as much as so many."""
+        self.left -= cost
         if self.left < 0:
             raise NotProvedError("the model is larger than this checker takes on")
 
@@ -455,6 +459,8 @@ Fixed = tuple[int, int]
 Slope = tuple[Fixed, dict[str, Fixed]]
 UNIT: Fixed = (1 << SCALE, 1 << SCALE)
 NONE: Fixed = (0, 0)
+#: What a tanh costs, in products.
+TANH_COST = 300
 
 
 def to_fixed(a: Interval) -> Fixed:
@@ -555,6 +561,7 @@ def fixed_sincos(a: Fixed) -> tuple[Fixed, Fixed]:
 
 def fixed_tanh(a: Fixed) -> Fixed:
     """Range of tanh."""
+    WORK.one(TANH_COST)
     low, high = (tanh_point(Fraction(end, 1 << SCALE)) for end in a)
     return to_fixed((low[0], high[1]))
 
@@ -574,6 +581,7 @@ def slopes(program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[
     moving = {name: {d: to_fixed(v) for d, v in along.items()} for name, along in tangents.items()}
 
     def const(value: Fraction) -> Slope:
+        WORK.one(1 + value.denominator.bit_length() // 64)
         return to_fixed((value, value)), {}
 
     entries = walk(program, lambda name: (inputs[name], moving.get(name, {})), const, _slope)
@@ -586,6 +594,7 @@ def slopes(program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[
 def _slope(operator: str, a: Slope, b: Slope | None = None) -> Slope:
     """One operation and its derivatives."""
     x, dx = a
+    WORK.one(1 + len(dx) + (len(b[1]) if b is not None else 0))
     if b is not None:
         return _slope_of_two(operator, a, b)
     if operator == "neg":
@@ -867,6 +876,7 @@ def reference_bounds(reference: dict[str, Any]) -> list[Interval]:
         need(segment["degree"] == 5 and 6 <= count <= MAX_COEFFICIENTS, "a segment is a spline of degree 5")
         knots = numbers(segment["knots"], count + 6, "knots")
         points = numbers(segment["coefficients"], count, "coefficients")
+        need(max(v.denominator.bit_length() for v in (*knots, *points)) <= MAX_BITS, "a spline's number is too long")
         need(knots[0] == knots[5] and knots[-1] == knots[-6], "a segment's knots must be clamped")
         need(knots == sorted(knots), "knots must not decrease")
         need(all(a < b for a, b in pairwise(knots[5 : count + 1])), "inner knots must increase")
@@ -993,7 +1003,8 @@ def check_names(
     """Refuse a model that reads what has no assumption, or a law that reads what a controller cannot know."""
     parameters = assumed["parameter"]
     need(not set(nominal) & set(assumed["feedforward"]), "a foreseen disturbance has no nominal value")
-    need(reads(plant, plant["outputs"][: len(states)]) <= set(parameters), "an inertia depends on more than parameters")
+    inertias = reads(plant, plant["outputs"][: len(states)])
+    need(inertias <= set(parameters) - {"effectiveness"}, "an inertia depends on more than constant parameters")
     listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], "r0", "r1", "r2", "r3"]
     for name in (*listed, *nominal, *(str(limit["name"]) for limit in limits)):
         need(isinstance(name, str) and NAME.fullmatch(name) is not None, "a name must be a plain identifier")
@@ -1090,15 +1101,17 @@ def stated_ranges(
     for kind in ("noise", "initial"):
         given = uncertainty.get(kind, {})
         for k, state in enumerate(states):
-            value = number(given.get(state, Fraction(0)), f"{kind} of {state}")
+            need(state in given, f"the study does not say {kind} of {state}")
+            value = number(given[state], f"{kind} of {state}")
+            need(value >= 0, f"{kind} of {state} must not be negative")
             if kind == "initial" or k > 1 or not observed:
                 stated.append((kind, state, -value, value))
     return stated
 
 
 def printable(unit: Any) -> bool:
-    """Whether a unit is short printable text."""
-    return isinstance(unit, str) and re.fullmatch(r"[ -~]{1,40}", unit) is not None
+    """Whether it is a unit and nothing else."""
+    return isinstance(unit, str) and UNIT_TEXT.fullmatch(unit) is not None
 
 
 # --- loop ---
@@ -2171,6 +2184,7 @@ class Coupling:
         need(not unread, f"the loads do not use {', '.join(sorted(unread))}, which the study states")
         places = {name for name in inputs if name[0] == "x"}
         need(reads(self.place) <= places, "the output reads a name that no member has")
+        need(bool(reads(self.place)), "the output must read a position")
         self.own = [self._own(member) for member in members]
         self.foreseeing = "mechanics" in study["controller"]["modelling"]
         for member in members:
@@ -2343,21 +2357,19 @@ class Observer:
     pole: Fraction
 
     def errors(self, noise: Fraction, acceleration: Fraction, initial: Fraction) -> tuple[Fraction, Fraction]:
-        """Bounds on the errors of position and speed at every sample.
+        """Bounds on the errors of position and speed at every sample, for gains as decimal, float64 and float32.
 
         In y_1 = e_1, y_2 = e_2 + k e_1 the errors obey |y(t + T)| <= A |y| + b; R = (I - A)^-1 b is not left, and
-        neither is any multiple of it that holds the start.
+        neither is any multiple of it that holds the start. For a fixed k each entry is convex in the gains, so it is
+        largest where both are at an end of what rounding makes of them; R grows with every entry.
         """
-        t, middle, spread = self.period, 1 + self.largest / 2, self.largest / 2
-        inflate = 1 + ROUNDING
-        k = (1 - middle * self.first - self.pole) / t
-        inward = (self.first, self.second + k * self.first)
-        a11, a12 = abs(1 - middle * self.first - k * t) + spread * abs(inward[0]), t
-        a21 = abs(-middle * inward[1] + k - k * (1 + k * t)) + spread * abs(inward[1])
-        a22 = abs(1 + k * t)
-        factor = (1 + self.largest) * noise
-        b1 = factor * abs(inward[0]) + acceleration * t * t / 2
-        b2 = factor * abs(inward[1]) + acceleration * t * (1 + abs(k) * t / 2)
+        k = (1 - (1 + self.largest / 2) * self.first - self.pole) / self.period
+        ends = (1 - ROUNDING, 1 + ROUNDING)
+        corners = [self._entries(k, self.first * p, self.second * q, noise) for p in ends for q in ends]
+        a11, a21, b1, b2 = (max(entry) for entry in zip(*corners, strict=True))
+        t = self.period
+        a12, a22 = t, abs(1 + k * t)
+        b1, b2 = b1 + acceleration * t * t / 2, b2 + acceleration * t * (1 + abs(k) * t / 2)
         determinant = (1 - a11) * (1 - a22) - a12 * a21
         if not (a11 < 1 and a22 < 1 and determinant > 0):
             raise NotProvedError("the observer does not contract for every value of its adaptive scalar")
@@ -2365,8 +2377,16 @@ class Observer:
         start = [noise, initial + abs(k) * noise]
         need(min(reach) > 0, "an observer without any error proves nothing")
         widest = max(Fraction(1), *(s / r for s, r in zip(start, reach, strict=True)))
-        reach = [up(widest * r * inflate) for r in reach]
+        reach = [up(widest * r) for r in reach]
         return reach[0], up(reach[1] + abs(k) * reach[0])
+
+    def _entries(self, k: Fraction, first: Fraction, second: Fraction, noise: Fraction) -> tuple[Fraction, ...]:
+        """What depends on the gains: A's first column, and the encoder's part of b."""
+        middle, spread, t = 1 + self.largest / 2, self.largest / 2, self.period
+        inward, factor = second + k * first, (1 + self.largest) * noise
+        a11 = abs(1 - middle * first - k * t) + spread * abs(first)
+        a21 = abs(-middle * inward + k - k * (1 + k * t)) + spread * abs(inward)
+        return a11, a21, factor * abs(first), factor * abs(inward)
 
 
 def observer_of(data: dict[str, Any], member: Member) -> Observer:
@@ -2384,7 +2404,7 @@ def observed(data: dict[str, Any], members: list[Member]) -> Obligation:
     noise = data["study"]["uncertainty"].get("noise", {})
     for member in members:
         claim = member.claim
-        encoder = number(noise.get(claim.rows[0]["state"], Fraction(0)), "the encoder's error")
+        encoder = number(noise[claim.rows[0]["state"]], "the encoder's error")
         motion_of(member)
         need(claim.first == "position", "an observer estimates a position and its rate")
         acceleration = guarantee_of(data, member.name)[2] + claim.period * magnitude(claim.reference[3])
@@ -2430,6 +2450,16 @@ def check_machine(data: dict[str, Any], file: str) -> Report:
     need(0 < len(names) <= MAX_MEMBERS and len(set(names)) == len(names), f"a machine has 1 to {MAX_MEMBERS} members")
     need(all(isinstance(name, str) and NAME.fullmatch(name) for name in names), "a member's name must be an identifier")
     need(set(names) == set(data["study"]["plant"]["joints"]), "the members are not those of the study")
+    study, states = data["study"], {row["state"] for entry in data["members"] for row in entry["model"]["rows"]}
+    for where, given, known in (
+        ("controller.members", study["controller"]["members"], set(names)),
+        ("controller.rates_hz", study["controller"].get("rates_hz", {}), set(names)),
+        ("requirements.member_error", study["requirements"].get("member_error", {}), set(names)),
+        ("uncertainty.noise", study["uncertainty"].get("noise", {}), states),
+        ("uncertainty.initial", study["uncertainty"].get("initial", {}), states),
+    ):
+        need(set(given) <= known, f"the study's {where} names something that the file does not have")
+    need(not study["plant"].get("parameters"), "a parameter of the study stands with the member that has it")
     couplings = data["couplings"]
     need(isinstance(couplings, list) and len(couplings) <= 1, "a machine has one coupling, or none")
     need(all(entry["members"] == names for entry in couplings), "a coupling is of all members in their order")

@@ -59,9 +59,9 @@ class Work:
         """Allow so many products from here on."""
         self.left = allowed
 
-    def one(self) -> None:
-        """Count a product."""
-        self.left -= 1
+    def one(self, cost: int = 1) -> None:
+        """Count a product, or what costs as much as so many."""
+        self.left -= cost
         if self.left < 0:
             raise NotProvedError("the model is larger than this checker takes on")
 

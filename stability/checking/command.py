@@ -54,6 +54,16 @@ def check_machine(data: dict[str, Any], file: str) -> Report:
     need(0 < len(names) <= MAX_MEMBERS and len(set(names)) == len(names), f"a machine has 1 to {MAX_MEMBERS} members")
     need(all(isinstance(name, str) and NAME.fullmatch(name) for name in names), "a member's name must be an identifier")
     need(set(names) == set(data["study"]["plant"]["joints"]), "the members are not those of the study")
+    study, states = data["study"], {row["state"] for entry in data["members"] for row in entry["model"]["rows"]}
+    for where, given, known in (
+        ("controller.members", study["controller"]["members"], set(names)),
+        ("controller.rates_hz", study["controller"].get("rates_hz", {}), set(names)),
+        ("requirements.member_error", study["requirements"].get("member_error", {}), set(names)),
+        ("uncertainty.noise", study["uncertainty"].get("noise", {}), states),
+        ("uncertainty.initial", study["uncertainty"].get("initial", {}), states),
+    ):
+        need(set(given) <= known, f"the study's {where} names something that the file does not have")
+    need(not study["plant"].get("parameters"), "a parameter of the study stands with the member that has it")
     couplings = data["couplings"]
     need(isinstance(couplings, list) and len(couplings) <= 1, "a machine has one coupling, or none")
     need(all(entry["members"] == names for entry in couplings), "a coupling is of all members in their order")

@@ -54,6 +54,7 @@ class Coupling:
         need(not unread, f"the loads do not use {', '.join(sorted(unread))}, which the study states")
         places = {name for name in inputs if name[0] == "x"}
         need(reads(self.place) <= places, "the output reads a name that no member has")
+        need(bool(reads(self.place)), "the output must read a position")
         self.own = [self._own(member) for member in members]
         self.foreseeing = "mechanics" in study["controller"]["modelling"]
         for member in members:

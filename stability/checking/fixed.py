@@ -18,6 +18,8 @@ Fixed = tuple[int, int]
 Slope = tuple[Fixed, dict[str, Fixed]]
 UNIT: Fixed = (1 << SCALE, 1 << SCALE)
 NONE: Fixed = (0, 0)
+#: What a tanh costs, in products.
+TANH_COST = 300
 
 
 def to_fixed(a: Interval) -> Fixed:
@@ -118,6 +120,7 @@ def fixed_sincos(a: Fixed) -> tuple[Fixed, Fixed]:
 
 def fixed_tanh(a: Fixed) -> Fixed:
     """Range of tanh."""
+    WORK.one(TANH_COST)
     low, high = (tanh_point(Fraction(end, 1 << SCALE)) for end in a)
     return to_fixed((low[0], high[1]))
 
@@ -137,6 +140,7 @@ def slopes(program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[
     moving = {name: {d: to_fixed(v) for d, v in along.items()} for name, along in tangents.items()}
 
     def const(value: Fraction) -> Slope:
+        WORK.one(1 + value.denominator.bit_length() // 64)
         return to_fixed((value, value)), {}
 
     entries = walk(program, lambda name: (inputs[name], moving.get(name, {})), const, _slope)
@@ -149,6 +153,7 @@ def slopes(program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[
 def _slope(operator: str, a: Slope, b: Slope | None = None) -> Slope:
     """One operation and its derivatives."""
     x, dx = a
+    WORK.one(1 + len(dx) + (len(b[1]) if b is not None else 0))
     if b is not None:
         return _slope_of_two(operator, a, b)
     if operator == "neg":

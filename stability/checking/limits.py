@@ -40,6 +40,10 @@ BITS, MAX_SHIFT = 96, 3_000
 FIXED, TERMS, MAX_NORM, FIXED_ERROR = 192, 120, 20, Fraction(1, 2**100)
 #: Fractional bits of the fixed-point intervals of a coupling, and bits beyond which nothing is proved.
 SCALE, MAX_FIXED = 160, 4_000
+#: Bits of the denominators of a reference's numbers.
+MAX_BITS = 400
+#: A unit, such as "kg m^2", "N m" or "rad/s".
+UNIT_TEXT = re.compile(r"[A-Za-z]{1,4}(\^[2-4])?( [A-Za-z]{1,4}(\^[2-4])?){0,3}(/[A-Za-z]{1,4}(\^[2-4])?)?")
 NAME, NUMBER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}"), re.compile(r"-?[0-9]+(/[0-9]+|(\.[0-9]+)?([eE][+-]?[0-9]+)?)")
 
 

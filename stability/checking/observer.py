@@ -29,21 +29,19 @@ class Observer:
     pole: Fraction
 
     def errors(self, noise: Fraction, acceleration: Fraction, initial: Fraction) -> tuple[Fraction, Fraction]:
-        """Bounds on the errors of position and speed at every sample.
+        """Bounds on the errors of position and speed at every sample, for gains as decimal, float64 and float32.
 
         In y_1 = e_1, y_2 = e_2 + k e_1 the errors obey |y(t + T)| <= A |y| + b; R = (I - A)^-1 b is not left, and
-        neither is any multiple of it that holds the start.
+        neither is any multiple of it that holds the start. For a fixed k each entry is convex in the gains, so it is
+        largest where both are at an end of what rounding makes of them; R grows with every entry.
         """
-        t, middle, spread = self.period, 1 + self.largest / 2, self.largest / 2
-        inflate = 1 + ROUNDING
-        k = (1 - middle * self.first - self.pole) / t
-        inward = (self.first, self.second + k * self.first)
-        a11, a12 = abs(1 - middle * self.first - k * t) + spread * abs(inward[0]), t
-        a21 = abs(-middle * inward[1] + k - k * (1 + k * t)) + spread * abs(inward[1])
-        a22 = abs(1 + k * t)
-        factor = (1 + self.largest) * noise
-        b1 = factor * abs(inward[0]) + acceleration * t * t / 2
-        b2 = factor * abs(inward[1]) + acceleration * t * (1 + abs(k) * t / 2)
+        k = (1 - (1 + self.largest / 2) * self.first - self.pole) / self.period
+        ends = (1 - ROUNDING, 1 + ROUNDING)
+        corners = [self._entries(k, self.first * p, self.second * q, noise) for p in ends for q in ends]
+        a11, a21, b1, b2 = (max(entry) for entry in zip(*corners, strict=True))
+        t = self.period
+        a12, a22 = t, abs(1 + k * t)
+        b1, b2 = b1 + acceleration * t * t / 2, b2 + acceleration * t * (1 + abs(k) * t / 2)
         determinant = (1 - a11) * (1 - a22) - a12 * a21
         if not (a11 < 1 and a22 < 1 and determinant > 0):
             raise NotProvedError("the observer does not contract for every value of its adaptive scalar")
@@ -51,8 +49,16 @@ class Observer:
         start = [noise, initial + abs(k) * noise]
         need(min(reach) > 0, "an observer without any error proves nothing")
         widest = max(Fraction(1), *(s / r for s, r in zip(start, reach, strict=True)))
-        reach = [up(widest * r * inflate) for r in reach]
+        reach = [up(widest * r) for r in reach]
         return reach[0], up(reach[1] + abs(k) * reach[0])
+
+    def _entries(self, k: Fraction, first: Fraction, second: Fraction, noise: Fraction) -> tuple[Fraction, ...]:
+        """What depends on the gains: A's first column, and the encoder's part of b."""
+        middle, spread, t = 1 + self.largest / 2, self.largest / 2, self.period
+        inward, factor = second + k * first, (1 + self.largest) * noise
+        a11 = abs(1 - middle * first - k * t) + spread * abs(first)
+        a21 = abs(-middle * inward + k - k * (1 + k * t)) + spread * abs(inward)
+        return a11, a21, factor * abs(first), factor * abs(inward)
 
 
 def observer_of(data: dict[str, Any], member: Member) -> Observer:
@@ -70,7 +76,7 @@ def observed(data: dict[str, Any], members: list[Member]) -> Obligation:
     noise = data["study"]["uncertainty"].get("noise", {})
     for member in members:
         claim = member.claim
-        encoder = number(noise.get(claim.rows[0]["state"], Fraction(0)), "the encoder's error")
+        encoder = number(noise[claim.rows[0]["state"]], "the encoder's error")
         motion_of(member)
         need(claim.first == "position", "an observer estimates a position and its rate")
         acceleration = guarantee_of(data, member.name)[2] + claim.period * magnitude(claim.reference[3])

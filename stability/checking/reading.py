@@ -7,13 +7,12 @@ plant that does not feel what the study states.
 from __future__ import annotations
 
 import math
-import re
 from fractions import Fraction
 from typing import Any
 
 from .arithmetic import Interval, magnitude
 from .claim import Claim, cell_of
-from .limits import CARRIED, MAX_CELLS, MAX_ROWS, NAME, REQUIRED, VECTORS, UnreadableError, need
+from .limits import CARRIED, MAX_CELLS, MAX_ROWS, NAME, REQUIRED, UNIT_TEXT, VECTORS, UnreadableError, need
 from .parsing import index, number, numbers, reads, valid_program
 from .reference import reference_bounds
 
@@ -116,7 +115,8 @@ def check_names(
     """Refuse a model that reads what has no assumption, or a law that reads what a controller cannot know."""
     parameters = assumed["parameter"]
     need(not set(nominal) & set(assumed["feedforward"]), "a foreseen disturbance has no nominal value")
-    need(reads(plant, plant["outputs"][: len(states)]) <= set(parameters), "an inertia depends on more than parameters")
+    inertias = reads(plant, plant["outputs"][: len(states)])
+    need(inertias <= set(parameters) - {"effectiveness"}, "an inertia depends on more than constant parameters")
     listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], "r0", "r1", "r2", "r3"]
     for name in (*listed, *nominal, *(str(limit["name"]) for limit in limits)):
         need(isinstance(name, str) and NAME.fullmatch(name) is not None, "a name must be a plain identifier")
@@ -213,12 +213,14 @@ def stated_ranges(
     for kind in ("noise", "initial"):
         given = uncertainty.get(kind, {})
         for k, state in enumerate(states):
-            value = number(given.get(state, Fraction(0)), f"{kind} of {state}")
+            need(state in given, f"the study does not say {kind} of {state}")
+            value = number(given[state], f"{kind} of {state}")
+            need(value >= 0, f"{kind} of {state} must not be negative")
             if kind == "initial" or k > 1 or not observed:
                 stated.append((kind, state, -value, value))
     return stated
 
 
 def printable(unit: Any) -> bool:
-    """Whether a unit is short printable text."""
-    return isinstance(unit, str) and re.fullmatch(r"[ -~]{1,40}", unit) is not None
+    """Whether it is a unit and nothing else."""
+    return isinstance(unit, str) and UNIT_TEXT.fullmatch(unit) is not None

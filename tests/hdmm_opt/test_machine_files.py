@@ -166,6 +166,52 @@ def _observer(d):
     }  # fmt: skip
 
 
+def _noise_of_nothing(d):
+    d["study"]["uncertainty"]["noise"] = {"positon": 1e-6, "speed": 1e-4}
+
+
+def _noise_left_out(d):
+    del d["study"]["uncertainty"]["noise"]["speed"]
+
+
+def _negative_noise(d):
+    d["study"]["uncertainty"]["noise"]["position"] = -1e-6
+
+
+def _parameter_of_nobody(d):
+    d["study"]["plant"]["parameters"] = {"payload_mass": {"value": 1e9, "tolerance": 0.9}}
+
+
+def _rate_of_nobody(d):
+    d["study"]["controller"]["rates_hz"] = {"elbow": 50.0}
+
+
+def _requirement_of_nobody(d):
+    d["study"]["requirements"]["member_error"]["elbow"] = 1e-9
+
+
+def _constant_output(d):
+    d["couplings"][0]["place"] = {"inputs": [], "operations": [["const", "1.0"]], "outputs": [0]}
+    d["couplings"][0]["envelope"]["output"] = "1/1000000000"
+    d["validation"]["largest_error_m"] = 0.0
+
+
+def _unit_with_a_claim(d):
+    member(d, "lift")["model"]["rows"][0]["unit"] = "rad (third party verified)"
+
+
+def _inertia_that_fades(d):
+    plant = member(d, "lift")["model"]["plant"]
+    effectiveness = next(k for k, o in enumerate(plant["operations"]) if o == ["input", "effectiveness"])
+    plant["operations"] += [["mul", plant["outputs"][1], effectiveness]]
+    plant["outputs"][1] = len(plant["operations"]) - 1
+
+
+def _long_number(d):
+    point = member(d, "lift")["reference"]["segments"][0]["coefficients"]
+    point[0] = point[0] + 1e-200 if point[0] == 0 else float("1e-250")
+
+
 def _weak_load(d):
     """The load enters a member's plant with a hundredth of its size."""
     program = member(d, "lift")["model"]["plant"]
@@ -203,6 +249,12 @@ MUTATIONS = {
     _stated_torque: (1, ""), _gain: (1, ""), _transient: (2, ""), _seen: (1, ""), _observer: (2, ""),
     _weak_load: (2, "does not enter the plant as its part of the machine's inertia"), _heavier_loads: (1, "load"),
     _load_without_acceleration: (1, "loads"),
+    _noise_of_nothing: (2, "names something that the file does not have"),
+    _noise_left_out: (2, "does not say noise of speed"), _negative_noise: (2, "must not be negative"),
+    _parameter_of_nobody: (2, "stands with the member"), _rate_of_nobody: (2, "controller.rates_hz names something"),
+    _requirement_of_nobody: (2, "member_error names something"), _constant_output: (2, "must read a position"),
+    _unit_with_a_claim: (2, "unit"), _inertia_that_fades: (2, "an inertia depends on more"),
+    _long_number: (2, "number is too long"),
 }  # fmt: skip
 
 
