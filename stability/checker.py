@@ -643,7 +643,8 @@ def _together(first: dict[str, Fixed], second: dict[str, Fixed]) -> dict[str, Fi
 
 def wrong_schema(found: Any) -> str:
     """What to say to a file of another kind or version."""
-    old = "hdmm-opt 0.1 reads it" if found == "hdmm-opt/gains/1" else "use the release that wrote the file"
+    known = {"hdmm-opt/gains/1": "hdmm-opt 0.1 reads it", "hdmm-opt/rejected/2": "a refused design left it, not proved"}
+    old = known.get(found if isinstance(found, str) else "", "use the release that wrote the file")
     return f'this release reads "{SCHEMA}": got {str(found)[:60]!r}; {old}'
 
 

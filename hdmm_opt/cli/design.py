@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     nargs=2,
     type=(click.Path(path_type=Path), str),
     metavar="FILE MEMBER",
-    help="For a machine of several members: take FILE's proofs, and prove anew only MEMBER, whose actuator is another.",
+    help="For members that push each other: take FILE's proofs, prove anew only MEMBER, whose actuator is another.",
 )
 @work
 def command(

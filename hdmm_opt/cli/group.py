@@ -48,7 +48,7 @@ class _Group(click.Group):
             click.echo(f"hdmm-opt: DEFECT of the prover: {error}", err=True)
             sys.exit(NOT_PROVED)
         except (KeyboardInterrupt, click.Abort):
-            click.echo("hdmm-opt: interrupted; nothing half-written, go on with --resume", err=True)
+            click.echo("hdmm-opt: interrupted; nothing half-written; where there is --resume, go on with it", err=True)
             sys.exit(INTERRUPTED)
 
 

@@ -8,7 +8,7 @@ import click
 
 BUDGET = click.option(
     "--budget", type=click.Choice(["quick", "full"]), default="quick", show_default=True,
-    help="quick: as the study says; full: 50 x 100 candidates, 1000 random runs, 10000 attacks.",
+    help="quick: as the study says; full: 50 x 100 candidates, and for a design 1000 random runs and 10000 attacks.",
 )  # fmt: skip
 RESUME = click.option("--resume", is_flag=True, help="Go on with an interrupted job.")
 SEED = click.option("--seed", type=click.IntRange(0), help="Seed of the search; that of the study by default.")

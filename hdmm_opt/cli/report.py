@@ -15,9 +15,12 @@ def command(file: Path, folder: Path) -> None:
     """Write the HTML page of FILE, a gain file or what a refusal left behind."""
     from ..files.read import read
     from ..files.report import check_report, write_report
+    from ..files.restore import whole
     from .outputs import prepared_folder
 
     check_report()
     document = read(file)
     prepared_folder(folder)
-    click.echo(str(write_report(document, folder)))
+    with whole():
+        target = write_report(document, folder)
+    click.echo(str(target))

@@ -1,6 +1,6 @@
 """What every control law is: gains with names and ranges, discrete states, and one control period as expressions.
 
-A law is written once. The simulation composes `step` with the plant, the export prints it, and where the law can be
+A law is written once. The simulation composes `step` with the plant, and where the law can be
 proved `loop_model` hands plant and law to the prover as data.
 """
 

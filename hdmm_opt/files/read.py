@@ -21,7 +21,7 @@ REJECTED = "hdmm-opt/rejected/2"
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Read a gain file, or what a refused design left behind, that matches its hashes and schema.
+    """Read a gain file that matches its hashes and schema, or what a refused design left behind, which has no hash.
 
     Raises:
         InvalidInputError: one line on what is wrong with the file.
@@ -33,12 +33,20 @@ def read(path: Path) -> dict[str, Any]:
         raise InvalidInputError(f"{path}: cannot read the gain file: {reason}; check the path") from None
     try:
         data = checker.parse(text)
-        if data.get("schema") != REJECTED:
+        if data.get("schema") == REJECTED:
+            _look(data)
+        else:
             checker.need(data.get("schema") == checker.SCHEMA, checker.wrong_schema(data.get("schema")))
             checker.check_digests(text)
     except checker.UnreadableError as error:
         raise InvalidInputError(f"{path}: unreadable: {error}") from None
     return json.loads(text)
+
+
+def _look(data: Mapping[str, Any]) -> None:
+    """Whether what a refused design left has its parts; it carries no proof and no hash."""
+    parts = {"study": dict, "members": list, "obligations": list}
+    checker.need(all(isinstance(data.get(key), kind) for key, kind in parts.items()), "a part of it is missing")
 
 
 def rejected(document: Mapping[str, Any]) -> bool:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -38,25 +39,52 @@ def restored(document: Mapping[str, Any]) -> tuple[Problem, GainSet]:
     Raises:
         InvalidInputError: the machine of the file is not what this release makes of its study.
     """
-    if rejected(document):
-        return assemble(study_of(document)), gains_of(document)
-    problem = assemble(study_of(document), references_of(document))
-    _same_machine(document, problem)
-    return problem, gains_of(document)
+    with whole():
+        if rejected(document):
+            return assemble(study_of(document)), gains_of(document)
+        problem = assemble(study_of(document), references_of(document))
+        _same_machine(document, problem)
+        return problem, _fitting(document)
+
+
+def _fitting(document: Mapping[str, Any]) -> GainSet:
+    """The gains, which are those of the study's members."""
+    found, ranges = gains_of(document), document["study"]["controller"]["members"]
+    if {name: len(own) for name, own in found.items()} != {name: len(own) for name, own in ranges.items()}:
+        raise InvalidInputError("the gains of this file are not those of its members; write it again with design")
+    return found
+
+
+@contextmanager
+def whole() -> Iterator[None]:
+    """Turn what a malformed file provokes into one line.
+
+    Raises:
+        InvalidInputError: a part of the file is missing or has the wrong type.
+    """
+    try:
+        yield
+    except (KeyError, TypeError, AttributeError, IndexError, ValueError, AssertionError) as error:
+        if isinstance(error, InvalidInputError):
+            raise
+        raise InvalidInputError(
+            f"a part of this file is missing or malformed: {error!r:.80}; write it again with design"
+        ) from None
 
 
 def offered(document: Mapping[str, Any], problem: Problem) -> dict[str, tuple[Loop, Scenario]]:
     """The scenarios that a file offers by name, each with its loop; a witness may have a control rate of its own."""
     loop = Loop(problem)
     found = {s.name: (loop, s) for s in scenarios(problem)}
-    worst = document.get("validation", {}).get("worst_case")
-    if worst:
-        found["worst-case"] = (loop, Scenario.from_data(worst["scenario"]))
-    for entry in document["obligations"]:
-        if entry.get("witness"):
-            period = 1 / float(entry["witness"]["rate_hz"])
-            own = loop if period == problem.period else Loop(problem, period=period)
-            found["witness"] = (own, Scenario.from_data(entry["witness"]["scenario"]))
+    with whole():
+        worst = document.get("validation", {}).get("worst_case")
+        if worst:
+            found["worst-case"] = (loop, Scenario.from_data(worst["scenario"]))
+        for entry in document["obligations"]:
+            if entry.get("witness"):
+                period = 1 / float(entry["witness"]["rate_hz"])
+                own = loop if period == problem.period else Loop(problem, period=period)
+                found["witness"] = (own, Scenario.from_data(entry["witness"]["scenario"]))
     return found
 
 

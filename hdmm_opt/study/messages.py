@@ -43,6 +43,8 @@ def one_line(error: ValidationError, whole: type[BaseModel]) -> str:
         return f"{path} must be {context.get('expected', 'a known word')}: got {shown}; choose one"
     if kind == "too_short":
         return f"{path} must have at least {context.get('min_length', 1)} entries: got {shown}; add what is missing"
+    if kind == "model_type":
+        return f"{path} must be a section: got {shown}; a fixed number is {{ value = {shown} }}"
     if kind == "tuple_type":
         return f"{path} must be a list: got {shown}; put it in brackets"
     rule = first["msg"].replace("Input should be", "must be")

@@ -15,7 +15,7 @@ Triple = tuple[float, float, float]
 
 
 class CraneSection(Section):
-    """The crane; its geometry, masses and drives are those of `plants/crane*.py`."""
+    """The crane; its geometry, masses and drives are those of `machines/crane*.py`."""
 
     model: Literal["crane"]
     least_lever_m_rad: Annotated[float, Field(gt=0, le=0.25)] = LEAST_LEVER

@@ -69,6 +69,10 @@ def parse(text: str, where: str) -> Study | MotionStudy:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InvalidInputError(f"{where}: not valid TOML: {error}; correct that line") from None
+    except (ValueError, RecursionError):
+        raise InvalidInputError(
+            f"{where}: not a study: a number has too many digits, or lists are nested too deeply; correct it"
+        ) from None
     motion = "controller" not in data and isinstance(data.get("reference"), dict) and "moves" in data["reference"]
     return _validated(data, where, MotionStudy) if motion else validated(data, where)
 
@@ -109,4 +113,4 @@ def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
     elif isinstance(data, bool) and not path.endswith("worst_case"):
         raise InvalidInputError(f"{path} must be a number or text: got {str(data).lower()}; correct the value")
     elif isinstance(data, int | float):
-        yield path, float(data) if isinstance(data, float) or abs(data) < 10**300 else math.copysign(1e300, data)
+        yield path, float(data) if isinstance(data, float) or abs(data) < 10**300 else 1e300

@@ -88,5 +88,5 @@ def check_names(names: Iterable[str]) -> None:
     listed = list(names)
     for name in listed:
         if listed.count(name) > 1 or name in RESERVED:
-            reason = "twice" if listed.count(name) > 1 else f"{name}, which hdmm-opt uses itself"
+            reason = f"{name} twice" if listed.count(name) > 1 else f"{name}, which hdmm-opt uses itself"
             raise refused("validation.scenarios", f"needs names of its own: got {reason}", "rename that scenario")

@@ -1,4 +1,4 @@
-"""The composition certificate (theory §3): weights that prove a ball for given gains.
+"""The composition certificate (docs/proof.md): weights that prove an ultimate set for given gains.
 
 ``V = sum w_i [ M_i Q_i² / 2 + g_i (θ̂_i - p_i/ε_i)² / (2 δ_i) ]``, where the second part is present only where p_i > 0;
 with p_i = 0 the adaptive scalar is a bounded time-varying gain and needs no place in V.
@@ -30,7 +30,7 @@ ROOM = 1.002
 
 @dataclass(frozen=True, kw_only=True)
 class Composition(Certificate):
-    """A composition certificate: the box and the ball bound the errors Q_i, `input_bound` the input error.
+    """A composition certificate: the box and the ultimate set bound the errors Q_i, `input_bound` the input error.
 
     Attributes:
         weights: w. Shape (n,).
@@ -101,8 +101,8 @@ class _Search:
                     row=_weakest(rows),
                     margin=_lacking(rows, half_widths),
                 )
-            needed, ultimate = self._radii(rows, found, decay)
-            needed = np.minimum(needed, np.maximum(self.initial * ROOM, rowwise_radii(rows, half_widths)))
+            needed, ultimate = self._sizes(rows, found, decay)
+            needed = np.minimum(needed, np.maximum(self.initial * ROOM, rowwise_sizes(rows, half_widths)))
             ultimate = np.minimum(ultimate, half_widths)
             if (needed * ROOM <= half_widths).all() and (rows.input_bound * ROOM <= input_bound).all():
                 return Composition(
@@ -158,7 +158,7 @@ class _Search:
 
     def _bound(self, rows: ErrorRows, scales: Array, decay: float) -> float:
         found = self._solve(rows, scales, decay)
-        return math.inf if found is None else float(self._radii(rows, found, decay)[1][0])
+        return math.inf if found is None else float(self._sizes(rows, found, decay)[1][0])
 
     def _solve(self, rows: ErrorRows, scales: Array, decay: float) -> Weights | None:
         adaptive = self.adaptive & (self.delta * self.sigma >= decay) & (rows.control_gain > 0)
@@ -166,8 +166,8 @@ class _Search:
             rows, scales, decay, AdaptationCost.of(rows, adaptive, self.epsilon, self.delta, self.sigma)
         )
 
-    def _radii(self, rows: ErrorRows, found: Weights, decay: float) -> tuple[Array, Array]:
-        """Radii of the invariant set, and of the ball that holds the errors after the transient."""
+    def _sizes(self, rows: ErrorRows, found: Weights, decay: float) -> tuple[Array, Array]:
+        """Sizes of the invariant set, and of the set that holds the errors after the transient."""
         level = ultimate_level(rows, found, decay, self.epsilon, self.delta, self.sigma)
         start = initial_level(rows, found, self.initial, self.epsilon, self.delta)
         settled = level + max(0.0, start - level) * math.exp(-decay * self.bounds.transient)
@@ -175,7 +175,7 @@ class _Search:
         return np.sqrt(2 * max(level, start) / scale), np.sqrt(2 * settled / scale)
 
 
-def rowwise_radii(rows: ErrorRows, half_widths: Array) -> Array:
+def rowwise_sizes(rows: ErrorRows, half_widths: Array) -> Array:
     """Radii that no single row can leave while the others stay inside theirs (first exit), inf where none exists.
 
     At ``|Q_i| = R_i`` row i gives ``M_i |Q_i|' <= S_ii R_i + sum_j |S_ij| R_j + D_i``, negative beyond this radius.

@@ -1,4 +1,4 @@
-"""Funnel obligations of the barrier law (theory §3): |Q_i(t)| < o_i(t) for every t, without relying on the adaptation.
+"""Funnel obligations of the barrier law: |Q_i(t)| < o_i(t) for every t, without relying on the adaptation.
 
     κ_i = -(β_i + ε_i θ̂_i / (o_i² - Q_i²)) Q_i / 2,     θ̂_i' = -δ_i σ_i θ̂_i + ε_i δ_i (Q_i / (o_i² - Q_i²))² / 2
     o_i(t) = (shoot_i - bound_i) exp(-rate_i t) + bound_i,   Q_i' = g_i (Q_{i+1} + κ_i) + d_i - κ_{i-1}'

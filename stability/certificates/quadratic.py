@@ -1,4 +1,4 @@
-"""The quadratic certificate (theory §4) for any linear inclusion, continuous or sampled.
+"""The quadratic certificate for any linear inclusion, continuous or sampled.
 
     z' (or z(t + T)) = (A + sum_k δ_k l_k r_k') z + B w,    |δ_k(t)| <= 1, |w_j(t)| <= 1
 

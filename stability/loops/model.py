@@ -65,7 +65,7 @@ class LoopModel:
 
 @dataclass(frozen=True, kw_only=True)
 class Gains:
-    """Gains of one controlled row (theory §2).
+    """Gains of one controlled row.
 
     Attributes:
         beta: Proportional gain β > 0.

@@ -310,3 +310,34 @@ def test_verbs_of_machines(text, tmp_path, monkeypatch):
     ):
         found = run.invoke(main, arguments)
         assert found.exit_code == 2 and words in found.stderr and len(found.stderr.strip().splitlines()) == 1, words
+
+
+@pytest.mark.parametrize("verb", ["simulate", "report"])
+@pytest.mark.parametrize(
+    "mutate",
+    [
+        lambda d: d["members"][0]["gains"][0].update(value="x"),
+        lambda d: d["members"][0]["gains"].pop(),
+        lambda d: d["members"][0].pop("nominal"),
+        lambda d: d["members"][0].update(name="elbow"),
+        lambda d: d["members"][0]["reference"].update(segments=5),
+        lambda d: d.update(obligations=None),
+        lambda d: d.update(members=[]),
+    ],
+)
+def test_a_malformed_file_is_refused_in_one_line(document, tmp_path, monkeypatch, verb, mutate):
+    monkeypatch.chdir(tmp_path)
+    mutate(document)
+    path = tmp_path / "bent.gains.json"
+    path.write_text(to_text(seal(document)), encoding="utf-8")
+    found = CliRunner().invoke(main, [verb, str(path)])
+    assert found.exit_code == 2 and len(found.stderr.strip().splitlines()) == 1, found.output
+
+
+@pytest.mark.parametrize("verb", ["simulate", "report"])
+def test_an_empty_refusal_is_refused(tmp_path, monkeypatch, verb):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "x.rejected.json"
+    path.write_text('{"schema": "hdmm-opt/rejected/2"}', encoding="utf-8")
+    found = CliRunner().invoke(main, [verb, str(path)])
+    assert found.exit_code == 2 and "a part of it is missing" in found.stderr
