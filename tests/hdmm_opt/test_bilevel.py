@@ -30,6 +30,7 @@ def found():
     return bilevel(JOB, evaluations=8)
 
 
+@pytest.mark.slow
 def test_every_motion_is_inside_its_limits_and_reaches_its_place(found):
     assert [m.name for m in found.ways] == [
         "time-optimal",

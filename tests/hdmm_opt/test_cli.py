@@ -205,6 +205,7 @@ def test_truncated_and_tampered_files_are_one_line(share, tmp_path, gain_text):
             assert (done.stdout + done.stderr).count("\n") == 1 and "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_interrupted_design_keeps_its_state_and_resumes_to_the_same_file(designed):
     folder, _ = designed
     text = (folder / "small.toml").read_text(encoding="utf-8").replace("iterations = 2", "iterations = 6")

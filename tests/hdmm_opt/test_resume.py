@@ -65,6 +65,7 @@ def content(path):
     return data
 
 
+@pytest.mark.slow
 def test_a_design_killed_twenty_times_ends_with_the_same_file(small, tmp_path):
     begun = time.monotonic()
     finish(hdmm(tmp_path, "design", small, "-o", "whole.gains.json"))
