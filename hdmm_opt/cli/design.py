@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .explain import explain, proved
+from .inputs import must_be_proved
 from .options import options_of, work
 from .statuses import NOT_PROVED, PROVED
 
 if TYPE_CHECKING:
     from ..design.options import Options
+
+NEEDED = "an actuator is exchanged in a proved file"
 
 
 @click.command()
@@ -64,7 +67,7 @@ def run(
         else:
             result = replace_actuator(standing, chosen, exchange[1], options, progress)
             if result.report is not None and result.report.status != PROVED:
-                _must_be_proved(exchange[0])
+                must_be_proved(exchange[0], NEEDED)
     document = rejected_document(result) if result.document is None else result.document
     write_text(rejected if result.document is None else target, to_text(document))
     if result.document is None:
@@ -88,16 +91,5 @@ def _standing(path: Path) -> dict[str, Any]:
 
     document = read(path)
     if rejected(document):
-        raise InvalidInputError(f"{path}: not proved; an actuator is exchanged in a proved file")
+        raise InvalidInputError(f"{path}: not proved; {NEEDED}")
     return document
-
-
-def _must_be_proved(path: Path) -> None:
-    """Say so where the file that was exchanged in is itself not proved."""
-    from stability import checker
-
-    from ..errors import InvalidInputError
-
-    report = checker.check_file(path)
-    if report.status != PROVED:
-        raise InvalidInputError(f"{path}: {report.message}; an actuator is exchanged in a proved file")

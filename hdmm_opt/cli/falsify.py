@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from .inputs import must_be_proved
 from .options import RESUME
 from .statuses import PROVED
 
@@ -24,10 +25,8 @@ def command(file: Path, budget: int, seed: int, jobs: int, resume: bool) -> None
 
 def run(path: Path, budget: int, seed: int, *, jobs: int = 1, resume: bool = False) -> int:
     """Attack a proved file, and write it with its worst run."""
-    from stability import checker
-
     from ..design.falsification import falsify
-    from ..errors import DefectError, InvalidInputError
+    from ..errors import DefectError
     from ..files.read import certified_of, read
     from ..files.restore import offered, restored
     from ..files.seal import prove, to_text
@@ -36,9 +35,7 @@ def run(path: Path, budget: int, seed: int, *, jobs: int = 1, resume: bool = Fal
     from ..files.validation import contradiction, stored
     from .progress import bar
 
-    report = checker.check_file(path)
-    if report.status != PROVED:
-        raise InvalidInputError(f"{path}: {report.message}; only a proved file can be attacked")
+    must_be_proved(path, "only a proved file can be attacked")
     document = read(path)
     problem, gains = restored(document)
     known = offered(document, problem)

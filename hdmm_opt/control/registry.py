@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module, util
-from pkgutil import iter_modules
-from typing import Any
-
 from stability import checker
 
+from ..discovery import all_offered, offered
 from ..errors import InvalidInputError
 from ..names import nearest
 from ..plants import Plant
@@ -21,7 +18,7 @@ def law_for(name: str, plant: Plant, modelling: tuple[str, ...]) -> ProvableLaw:
         InvalidInputError: there is no such law, the checker has no obligations for it, or it has not that modelling
             term for this plant.
     """
-    kind = _kind(name)
+    kind = offered(f"{__package__}", name, "LAW")
     if kind is None:
         raise InvalidInputError(f'controller.law "{name}" is unknown; {nearest(name, law_names())}')
     if name not in checker.REQUIRED:
@@ -37,11 +34,4 @@ def law_for(name: str, plant: Plant, modelling: tuple[str, ...]) -> ProvableLaw:
 
 def law_names() -> list[str]:
     """All names that a study can give."""
-    package = import_module(__package__ or "")
-    return [info.name for info in iter_modules(package.__path__) if _kind(info.name) is not None]
-
-
-def _kind(name: str) -> Any:
-    if not name.isidentifier() or util.find_spec(f"{__package__}.{name}") is None:
-        return None
-    return getattr(import_module(f"{__package__}.{name}"), "LAW", None)
+    return list(all_offered(f"{__package__}", "LAW"))

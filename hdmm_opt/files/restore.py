@@ -140,7 +140,7 @@ def standing(document: Mapping[str, Any], study: Study, name: str) -> tuple[Prob
     for entry in document["members"]:
         key = entry["name"]
         plain = old if key == name else problem
-        bounds = _stated(old.member(key).bounds, entry, old.member(key))
+        bounds = _stated(old.member(key), entry)
         contracts[key] = _stood(key, plain, gains, bounds, entry)
     return problem, gains, contracts, old.member(name)
 
@@ -153,11 +153,11 @@ def _stood(name: str, problem: Problem, gains: GainSet, bounds: Bounds, entry: M
     return replace(found, guarantee=Tube(position=position, speed=speed, acceleration=acceleration))
 
 
-def _stated(bounds: Bounds, entry: Mapping[str, Any], member: Member) -> Bounds:
+def _stated(member: Member, entry: Mapping[str, Any]) -> Bounds:
     """The assumptions of a member's entry in place of those of a member without neighbours."""
     ranges = {a["name"]: Interval(float(a["lower"]), float(a["upper"])) for a in entry["assumptions"]}
     return replace(
-        bounds,
-        disturbances={key: ranges[f"disturbance.{key}"] for key in bounds.disturbances},
+        member.bounds,
+        disturbances={key: ranges[f"disturbance.{key}"] for key in member.bounds.disturbances},
         noise=tuple(ranges[f"noise.{state}"].high for state in member.plant.states),
     )

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib import import_module, util
-from pkgutil import iter_modules
 
+from ..discovery import all_offered, offered
 from .parameter import Parameter
 from .plant import Plant
 
@@ -28,12 +27,9 @@ class PlantModel:
 
 def plant_model(name: str) -> PlantModel | None:
     """The plant of a name, or None."""
-    if not name.isidentifier() or util.find_spec(f"{__package__}.{name}") is None:
-        return None
-    return getattr(import_module(f"{__package__}.{name}"), "PLANT", None)
+    return offered(f"{__package__}", name, "PLANT")
 
 
 def plant_names() -> list[str]:
     """All names."""
-    package = import_module(__package__ or "")
-    return [info.name for info in iter_modules(package.__path__) if plant_model(info.name) is not None]
+    return list(all_offered(f"{__package__}", "PLANT"))
