@@ -31,12 +31,27 @@ parsing: Numbers, hashes and operation lists of a file, refused where they are m
 
   Must fail: numbers in other forms, doubled keys, changed content, unknown operators, indices that come later.
 
+shape: Every key that a file may have, and what stands at it; whatever else stands in a file is refused.
+
+  Must fail: unknown or missing keys, numbers as text, text that is no plain text, more entries than a file of ours has.
+
 claim: The statement about one member as data.
 
 reference: Bounds of a reference for all t from its control points.
 
-  Theorem: a spline lies in the hull of its control points (de Boor 1978). Must fail: jumps, a moving end, other
+  Theorem: a spline lies in the hull of its control points (de Boor 1978), a piece of it in that of its Bezier points,
+  found by blossoms (Ramshaw 1989). Must fail: jumps, a moving end, other
   bounds.
+
+statement: What a file says more than once, and what it records, against the study and the proof.
+
+  Must fail: units, sources, meanings and nominal values that are not the study's, requirements that are not met,
+  records that the proof excludes, golden vectors that repeat each other.
+
+course: The reference of a file is the study's: its places, pauses, durations and limits.
+
+  Theorem: as `reference`. Must fail: another waypoint, another duration, a move beyond a limit, a last
+  segment that is not the study's.
 
 reading: Reads what a file says of a member, and refuses what is not the study's.
 
@@ -56,7 +71,7 @@ period: The map over a control period and the positive system that bounds it.
   Theorem: |y(t + T)| <= A |y| + b at every vertex of the inertias, by comparison (docs/proof.md). Must fail: other
   coordinates, fewer cells, a cell of another range.
 
-obligation: One verdict, and the verdicts on a file.
+obligation: One verdict, and the verdicts on a file; bounds and margins in few digits that hold.
 
 composition: The composition certificate: a Lyapunov function of all subsystems.
 
@@ -69,19 +84,23 @@ sampled: The sampled certificate: a comparison system on the exact zero-order-ho
   Theorem: A R + b <= R is never left, A s <= (1 - mu T) s tells how fast R is reached (Bellman 1962; Siljak 1978).
   Obligations: contraction, invariance, sampling, accuracy. Must fail: smaller reach, start or shape, a faster decay.
 
+golden: Golden vectors follow from the gains and the law, to float accuracy.
+
+effects: Whether a plant and a coupling feel what the study states.
+
+  Two floats that differ are a witness that they do; nothing is proved of how much. Obligation: plant. Must fail: a
+  plant that multiplies its load by 0, a parameter without effect, a machine that is the same for every payload.
+
 obligations: All obligations of a member, decided.
 
   Obligations: non-vacuity, reference, authority, adaptation, rounding, accuracy, and those of the certificate's kind.
   Must fail: lower limits, a shorter stroke, a tighter requirement, a faster adaptation than the rate allows.
 
-golden: Golden vectors follow from the gains and the law, to float accuracy.
-
 member: A member of a machine: read, decided, and compared with what the file records.
 
 motion: The motion of all members over slices of time.
 
-  Theorem: Bezier points by blossoms hold a spline's piece (Ramshaw 1989). Obligation: motion. Must fail: knots that
-  differ.
+  Obligation: motion. Must fail: knots that differ, more slices than a file of ours.
 
 coupling: What members do to each other.
 
@@ -104,8 +123,10 @@ import json
 import math
 import re
 import sys
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+import textwrap
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from itertools import pairwise, product
 from pathlib import Path
@@ -114,7 +135,17 @@ from typing import Any
 # --- limits ---
 
 #: What must be proved of every member whatever its law.
-COMMON = ("non-vacuity", "reference", "invariance", "authority", "sampling", "adaptation", "rounding", "accuracy")
+COMMON = (
+    "plant",
+    "non-vacuity",
+    "reference",
+    "invariance",
+    "authority",
+    "sampling",
+    "adaptation",
+    "rounding",
+    "accuracy",
+)
 SCHEMA = "hdmm-opt/gains/2"
 #: What must be proved of each member for its law and its kind of certificate; a file that leaves one out is refused.
 REQUIRED = {
@@ -123,17 +154,19 @@ REQUIRED = {
         "sampled": ("contraction", *COMMON),
     }
 }
-#: What must be proved beside it where members push each other, and where an observer stands for a measured speed.
-COUPLED, OBSERVED = ("guarantees", "motion", "loads", "coupling", "output"), ("guarantees", "observer")
 #: Vectors of each kind of certificate.
 VECTORS = {"composition": ("weights", "young", "leak"), "sampled": ("reach", "start", "shape")}
-MAX_BYTES, MAX_DIGITS, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 20_000_000, 300, 12_000, 8, 5_000
-#: Cells of a sampled certificate, digits of its numbers, and (vertices + 8) n³ summed over its cells.
-MAX_CELLS, MAX_CELL_DIGITS, MAX_VERTICES = 64, 60, 40_000
-#: Interval products that one member and the coupling of a machine may take; a file of ours takes a tenth of it.
-MAX_PRODUCTS, MAX_COUPLED = 100_000, 20_000_000
+MAX_BYTES, MAX_DIGITS, MAX_EXPONENT, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 2_000_000, 60, 60, 12_000, 8, 1_000
+#: Cells of a sampled certificate.
+MAX_CELLS = 64
+#: A range of an assumption is that of the study to this share: it is written rounded outwards.
+ROUND = Fraction(1, 10**12)
+#: An effect of what a study states, relative to all that moves a row, below which it counts for none.
+LEAST_EFFECT = Fraction(1, 10**9)
+#: Interval products that all members and the coupling of a machine may take; files of ours take up to half.
+MAX_PRODUCTS, MAX_COUPLED = 250_000, 4_500_000
 #: Members of a machine, and slices of time that its motion may be cut into.
-MAX_MEMBERS, MAX_SLICES = 8, 4_000
+MAX_MEMBERS, MAX_SLICES = 8, 1_000
 #: Names of the parameter that holds a member's own part of the bodies' inertia.
 CARRIED = ("load_mass", "load_inertia")
 #: Parts of the ranges of speed and load in which the answer of an acceleration to a load is bounded.
@@ -148,7 +181,7 @@ SCALE, MAX_FIXED = 160, 4_000
 #: Bits of the denominators of a reference's numbers.
 MAX_BITS = 400
 #: A unit, such as "kg m^2", "N m" or "rad/s".
-UNIT_TEXT = re.compile(r"[A-Za-z]{1,4}(\^[2-4])?( [A-Za-z]{1,4}(\^[2-4])?){0,3}(/[A-Za-z]{1,4}(\^[2-4])?)?")
+UNIT_TEXT = re.compile(r"1|[A-Za-z]{1,4}(\^[2-4])?( [A-Za-z]{1,4}(\^[2-4])?){0,3}(/[A-Za-z]{1,4}(\^[2-4])?)?")
 NAME, NUMBER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}"), re.compile(r"-?[0-9]+(/[0-9]+|(\.[0-9]+)?([eE][+-]?[0-9]+)?)")
 
 
@@ -286,8 +319,13 @@ def tanh_point(x: Fraction) -> Interval:
     return down(1 - 2 / (low + 1)), up(1 - 2 / (high + 1))
 
 
+#: What a tanh costs, in products.
+TANH_WORK = 100
+
+
 def tanh(a: Interval) -> Interval:
     """Range of tanh."""
+    WORK.one(TANH_WORK)
     return tanh_point(a[0])[0], tanh_point(a[1])[1]
 
 
@@ -664,10 +702,9 @@ def rational(text: str, what: str = "a number") -> Fraction:
     need(len(text) <= MAX_DIGITS, f"{what} has over {MAX_DIGITS} digits")
     need(NUMBER.fullmatch(text) is not None, f"{what} must be a finite number: got {text[:40]!r}")
     exponent = text.lower().partition("e")[2] or "0"
-    need(abs(int(exponent)) <= 300, f"{what} has an exponent beyond 300: {text[:40]}")
+    need(abs(int(exponent)) <= MAX_EXPONENT, f"{what} has an exponent beyond {MAX_EXPONENT}: {text[:40]}")
     need(not text.endswith("/0"), f"{what} divides by zero")
     value = Fraction(text)
-    need(abs(value) < Fraction(10) ** 300, f"{what} is beyond 1e300")
     return value
 
 
@@ -753,6 +790,8 @@ def valid_program(program: Any, what: str, *, turning: bool = False) -> dict[str
         clean.append([operator, *arguments])
     outputs = [index(o, len(clean), what) for o in program.get("outputs", [])]
     need(bool(outputs), f"{what} has no output")
+    names = list(dict.fromkeys(arguments[0] for operator, *arguments in clean if operator == "input"))
+    need(sorted(program["inputs"]) == sorted(names), f"{what} does not list the inputs that it has")
     return {"operations": clean, "outputs": outputs}
 
 
@@ -775,6 +814,296 @@ def reads(program: dict[str, Any], outputs: Iterable[int] | None = None) -> set[
             elif operator != "const":
                 needed.update(arguments)
     return names
+
+
+# --- shape ---
+
+#: Refuses a value at a place of the file that it does not fit.
+Rule = Callable[[Any, str], None]
+
+
+def entry_of(fixed: dict[str, Rule], optional: dict[str, Rule] | None = None) -> Rule:
+    """An object with these keys, and none but them."""
+    may = optional or {}
+
+    def rule(value: Any, where: str) -> None:
+        need(isinstance(value, dict), f"{where} must be an object")
+        for key in value:
+            need(key in fixed or key in may, f"unknown key {where}.{key:.40}")
+        for key in fixed:
+            need(key in value, f"{where}.{key} is missing")
+        for key, part in value.items():
+            (fixed.get(key) or may[key])(part, f"{where}.{key}")
+
+    return rule
+
+
+def named(part: Rule, largest: int = 64) -> Rule:
+    """An object with names for keys."""
+
+    def rule(value: Any, where: str) -> None:
+        need(isinstance(value, dict) and len(value) <= largest, f"{where} must be an object of at most {largest}")
+        for key, inner in value.items():
+            need(all(NAME.fullmatch(word) for word in key.split(".")), f"a key of {where} must be a plain name")
+            part(inner, f"{where}.{key}")
+
+    return rule
+
+
+def listed(part: Rule, low: int, high: int) -> Rule:
+    """A list."""
+
+    def rule(value: Any, where: str) -> None:
+        good = isinstance(value, list) and low <= len(value) <= high
+        need(good, f"{where} must list {low} to {high} entries" if low < high else f"{where} must list {low} entries")
+        for k, inner in enumerate(value):
+            part(inner, f"{where}[{k}]")
+
+    return rule
+
+
+def some(*words: str) -> Rule:
+    """One of some words."""
+
+    def rule(value: Any, where: str) -> None:
+        need(isinstance(value, str) and value in words, f"{where} must be one of {', '.join(words)}: got {value!r:.40}")
+
+    return rule
+
+
+def maybe(part: Rule) -> Rule:
+    """Null or a value."""
+
+    def rule(value: Any, where: str) -> None:
+        if value is not None:
+            part(value, where)
+
+    return rule
+
+
+def plain_number(value: Any, where: str) -> None:
+    """A JSON number."""
+    need(isinstance(value, Fraction), f"{where} must be a number: got {value!r:.40}")
+
+
+def whole(value: Any, where: str) -> None:
+    """A whole number that is not negative."""
+    good = isinstance(value, Fraction) and value.denominator == 1 and value >= 0
+    need(good, f"{where} must be a whole number: got {value!r:.40}")
+
+
+def ratio(value: Any, where: str) -> None:
+    """An exact number, as text."""
+    need(isinstance(value, str), f"{where} must be an exact number in a string: got {value!r:.40}")
+
+
+def flag(value: Any, where: str) -> None:
+    """True or false."""
+    need(isinstance(value, bool), f"{where} must be true or false: got {value!r:.40}")
+
+
+def text(value: Any, where: str) -> None:
+    """A line of text."""
+    need(isinstance(value, str) and len(value) <= 400, f"{where} must be a line of text")
+
+
+def name(value: Any, where: str) -> None:
+    """A plain identifier."""
+    need(
+        isinstance(value, str) and NAME.fullmatch(value) is not None, f"{where} must be a plain name: got {value!r:.40}"
+    )
+
+
+def unit(value: Any, where: str) -> None:
+    """A unit and nothing else."""
+    good = isinstance(value, str) and UNIT_TEXT.fullmatch(value) is not None
+    need(good, f"{where} must be a unit: got {value!r:.40}")
+
+
+def target(value: Any, where: str) -> None:
+    """What a row tracks."""
+    if not isinstance(value, Fraction):
+        some("reference", "zero")(value, where)
+
+
+def operation(value: Any, where: str) -> None:
+    """An operator with its arguments; `parsing` reads them."""
+    need(isinstance(value, list) and 2 <= len(value) <= 3, f"{where} must be an operation")
+
+
+def versions(value: Any, where: str) -> None:
+    """Versions of packages by name."""
+    need(isinstance(value, dict) and len(value) <= 32, f"{where} must be an object")
+    for package, version in value.items():
+        text(package, where)
+        text(version, where)
+
+
+MODELLING = ("mechanics", "friction", "resistance", "back_emf", "decoupling")
+RANGE = entry_of({}, dict.fromkeys(("value", "min", "max"), plain_number))
+SOURCE = some("table", "derived", "public", "assumed")
+HASH = text
+PAIR = listed(plain_number, 2, 2)
+TRIPLE = listed(plain_number, 3, 3)
+LIMIT = entry_of({"value": plain_number, "unit": unit, "source": SOURCE})
+STROKES = {key: PAIR for key in ("stroke_m", "stroke_rad", "stroke_m_s", "stroke_rad_s")}
+DRIVE = entry_of(
+    {
+        "parameters": named(entry_of({"value": plain_number, "unit": unit, "tolerance": plain_number,
+                                      "source": SOURCE, "meaning": text})),
+        "limits": named(LIMIT),
+    },
+    {"ratings": named(LIMIT), "least_effectiveness": plain_number, "bundled": listed(text, 0, 64), **STROKES},
+)  # fmt: skip
+NOTHING = named(text, 0)
+COURSE = listed(PAIR, 1, 1_000)
+FAULT = entry_of({"share": plain_number, "start_s": plain_number, "rate_1_s": plain_number,
+                  "stuck": listed(plain_number, 0, 2)})  # fmt: skip
+SCENARIO = {
+    "name": text, "disturbances": named(COURSE), "parameters": named(plain_number), "noise": plain_number,
+    "bias": plain_number, "initial": plain_number, "quantisation": plain_number, "faults": named(FAULT),
+}  # fmt: skip
+MOTION_LIMITS = entry_of(
+    dict.fromkeys(("speed_m_s", "acceleration_m_s2", "jerk_m_s3"), plain_number),
+    dict.fromkeys(("torque_nm", "current_a", "voltage_v"), plain_number),
+)
+REQUIREMENTS = (
+    "settling_time_s", "peak_torque_nm", "rms_torque_nm", "peak_current_a", "rms_current_a", "peak_voltage_v",
+)  # fmt: skip
+STUDY = entry_of(
+    {
+        "study": entry_of({"name": text, "publication": text, "summary": text}),
+        "plant": entry_of(
+            {"model": text, "parameters": NOTHING, "ratings": NOTHING, "limits": NOTHING,
+             "joints": named(DRIVE, MAX_MEMBERS), "locked": named(plain_number)},
+            {"level": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
+        ),
+        "uncertainty": entry_of({
+            "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit})),
+            "noise": named(plain_number), "initial": named(plain_number),
+        }),
+        "reference": entry_of(
+            {"kind": some("quintic", "bspline"), "coordinates": some("members"),
+             "waypoints": listed(listed(plain_number, 1, MAX_MEMBERS), 2, 50),
+             "durations_s": listed(plain_number, 0, 49), "dwell_s": plain_number, "objective": some("time", "energy"),
+             "pace": plain_number, "jerk_weight": plain_number, "longest_s": plain_number, "spans": whole},
+            {"limits": MOTION_LIMITS},
+        ),
+        "controller": entry_of(
+            {"law": text, "modelling": listed(some(*MODELLING), 0, 8), "rate_hz": plain_number,
+             "rates_hz": named(plain_number),
+             "gains": NOTHING, "members": named(named(RANGE))},
+            {"observer": entry_of(dict.fromkeys(("bandwidth_rad_s", "largest", "epsilon", "sigma"), plain_number))},
+        ),
+        "requirements": entry_of(
+            {"tracking_error_m": plain_number, "member_error": named(plain_number)},
+            dict.fromkeys((*REQUIREMENTS, "settling_band_m"), plain_number),
+        ),
+        "tuning": entry_of(
+            {"method": some("jaya", "tlbo", "random", "gradient"), "population": whole, "iterations": whole,
+             "seed": whole,
+             "weights": entry_of(dict.fromkeys(("rms_error", "certified_bound", "itae", "effort"), plain_number))},
+            {"seconds": plain_number},
+        ),
+        "validation": entry_of({"transient_s": plain_number, "monte_carlo": whole, "falsify": whole,
+                                "worst_case": flag, "scenarios": listed(entry_of(SCENARIO), 1, 200)}),
+        "sha256": HASH,
+    }
+)  # fmt: skip
+PROGRAM = entry_of({"inputs": listed(text, 0, 200), "operations": listed(operation, 1, MAX_OPERATIONS),
+                    "outputs": listed(whole, 1, 64)})  # fmt: skip
+EXACT = listed(ratio, 1, MAX_ROWS)
+CERTIFICATE = entry_of(
+    {"kind": text, "decay": ratio, "half_widths": EXACT, "input_bound": EXACT,
+     "envelope": entry_of({"rate": ratio, "ultimate": EXACT})},
+    {"guarantee": listed(ratio, 3, 3), "weights": EXACT, "young": EXACT, "leak": EXACT,
+     "split": listed(whole, 1, MAX_ROWS),
+     "cells": listed(entry_of({"transform": listed(EXACT, 1, MAX_ROWS), "reach": EXACT, "start": EXACT,
+                               "shape": EXACT}), 1, MAX_CELLS)},
+)  # fmt: skip
+MEMBER = entry_of(
+    {
+        "name": name,
+        "model": entry_of({
+            "rows": listed(entry_of({"state": name, "unit": unit, "target": target, "controlled": flag}), 1, MAX_ROWS),
+            "input_map": listed(whole, 1, MAX_ROWS), "inputs": listed(name, 1, MAX_ROWS), "plant": PROGRAM,
+            "law": listed(PROGRAM, 1, MAX_ROWS),
+            "limits": listed(entry_of({"name": name, "signals": listed(name, 1, MAX_ROWS)}), 1, 16),
+            "first": some("position", "speed"),
+        }),
+        "nominal": named(plain_number),
+        "gains": listed(entry_of({"name": name, "value": plain_number, "unit": text, "min": plain_number,
+                                  "max": plain_number, "meaning": text}), 1, 64),
+        "assumptions": listed(entry_of({"name": text, "lower": plain_number, "upper": plain_number, "unit": unit,
+                                        "source": text}), 1, 128),
+        "reference": entry_of({
+            "segments": listed(entry_of({"degree": whole, "knots": listed(plain_number, 12, MAX_COEFFICIENTS + 6),
+                                         "coefficients": listed(plain_number, 6, MAX_COEFFICIENTS)}), 1, 200),
+            "derivative_bounds": listed(entry_of({"name": name, "unit": unit, "lower": plain_number,
+                                                  "upper": plain_number}), 4, 4),
+            "sha256": HASH,
+        }),
+        "certificate": CERTIFICATE,
+        "golden": listed(entry_of(
+            {key: listed(plain_number, 1, MAX_ROWS) for key in ("x", "r", "theta", "u", "theta_next")},
+            {"load": listed(plain_number, 1, 1)}), 20, 100),
+    },
+    {"observer": entry_of({"first": plain_number, "second": plain_number, "pole": plain_number})},
+)  # fmt: skip
+COUPLING = entry_of({"members": listed(name, 1, MAX_MEMBERS), "loads": PROGRAM, "place": PROGRAM, "halvings": whole,
+                     "envelope": entry_of({"output": ratio})})  # fmt: skip
+OBLIGATION = entry_of(
+    {"name": text, "member": text, "verdict": some("proved")}, {"statement": text, "margin": plain_number, "unit": text}
+)
+RECORDED = maybe(plain_number)
+FIGURES = entry_of({
+    **dict.fromkeys(("maximum_error_m", "largest_error_m", "rms_error_m", "settling_time_s", "itae", "limit_use",
+                     "diverged_s"), RECORDED),
+    "members": named(entry_of({
+        **dict.fromkeys(("largest_error", "maximum_error", "rms_error", "limit_use", "peak_input", "energy_j"),
+                        RECORDED),
+        "peaks": named(RECORDED), "rms": named(RECORDED), "estimates": listed(RECORDED, 0, 2),
+    })),
+})  # fmt: skip
+VALIDATION = entry_of({
+    "requirements": listed(entry_of({"name": text, "required": plain_number, "simulated": plain_number,
+                                     "certified": maybe(plain_number)}), 1, 32),
+    "scenarios": listed(entry_of({"name": text, "figures": FIGURES}), 1, 200),
+    "worst_case": maybe(entry_of({"scenario": entry_of({**SCENARIO, "seed": whole}), "figures": FIGURES})),
+    "monte_carlo": maybe(entry_of({"runs": whole, "met": whole})),
+    "simulated_runs": whole, "integration_error_m": plain_number, "largest_error_m": plain_number,
+    "largest_error_after_transient_m": plain_number,
+    "members": named(entry_of(
+        {"largest_error": plain_number, "largest_error_after_transient": plain_number, "unit": unit},
+        {"estimates": listed(plain_number, 2, 2)})),
+})  # fmt: skip
+PROVENANCE = entry_of(
+    {}, {"versions": versions, "seed": whole, "budget": some("quick", "full"), "evaluations": whole,
+         "search_runs": whole, "wall_time_s": plain_number, "threads": whole, "cpus": maybe(whole)},
+)  # fmt: skip
+FILE = entry_of({
+    "schema": text, "study": STUDY, "members": listed(MEMBER, 1, MAX_MEMBERS), "couplings": listed(COUPLING, 0, 1),
+    "obligations": listed(OBLIGATION, 0, 200), "validation": VALIDATION, "provenance": PROVENANCE, "sha256": HASH,
+})  # fmt: skip
+
+
+def plain_text(value: Any) -> None:
+    """Refuse control characters, lone surrogates and other text that a terminal does not print as it stands."""
+    if isinstance(value, dict):
+        for key, part in value.items():
+            plain_text(key)
+            plain_text(part)
+    elif isinstance(value, list):
+        for part in value:
+            plain_text(part)
+    elif isinstance(value, str) and not value.isprintable():
+        raise UnreadableError(f"a text of the file is not plain text: {value!a:.60}")
+
+
+def shaped(data: dict[str, Any]) -> None:
+    """Refuse a file with any other keys or kinds of values."""
+    plain_text(data)
+    FILE(data, "file")
 
 
 # --- claim ---
@@ -859,12 +1188,14 @@ def cell_of(entry: dict[str, Any], count: int) -> Cell:
     need(isinstance(rows, list) and len(rows) == count, f"a transform must have {count} rows")
     vectors = [numbers(entry[name], count, name) for name in VECTORS["sampled"]]
     transform = [numbers(row, count, "a transform") for row in rows]
-    longest = max(len(str(v)) for row in (*transform, *vectors) for v in row)
-    need(longest <= MAX_CELL_DIGITS, f"a cell's numbers have at most {MAX_CELL_DIGITS} digits")
     return Cell(transform, *vectors)
 
 
 # --- reference ---
+
+#: What a piece of a spline costs, in products.
+PIECE_COST = 200
+
 
 def reference_bounds(reference: dict[str, Any]) -> list[Interval]:
     """Position … jerk of the splines, from their control points; refuses jumps and a moving end."""
@@ -904,6 +1235,320 @@ def reference_bounds(reference: dict[str, Any]) -> list[Interval]:
     return [(min(h + zero), max(h + zero)) for h, zero in zip(hulls, at_rest, strict=True)]
 
 
+def ranges_on(
+    knots: list[Fraction], points: list[Fraction], span: int, ends: tuple[Fraction, Fraction]
+) -> list[Interval]:
+    """Hulls of the Bezier points of position … jerk of a spline on a part of a span, by blossoms (Ramshaw 1989)."""
+    WORK.one(PIECE_COST)
+    degree = 5
+    curve = [
+        blossom(knots, points, span, [ends[0]] * (degree - k) + [ends[1]] * k) for k in range(degree + 1)
+    ]  # fmt: skip
+    found = []
+    for order in range(4):
+        found.append((down(min(curve)), up(max(curve))))
+        curve = [(degree - order) * (b - a) / (ends[1] - ends[0]) for a, b in pairwise(curve)]
+    return found
+
+
+def blossom(knots: list[Fraction], points: list[Fraction], span: int, arguments: list[Fraction]) -> Fraction:
+    """The symmetric multi-affine form of a spline's piece."""
+    degree = len(arguments)
+    values = points[span - degree : span + 1]
+    for level, t in enumerate(arguments):
+        following = []
+        for j in range(degree - level):
+            first = knots[span - degree + level + 1 + j]
+            last = knots[span + 1 + j]
+            share = (t - first) / (last - first)
+            following.append(values[j] + share * (values[j + 1] - values[j]))
+        values = following
+    return values[0]
+
+
+# --- statement ---
+
+#: Meaning of a gain by its kind.
+MEANINGS = {
+    "beta": "proportional gain", "epsilon": "adaptation gain", "delta": "adaptation rate",
+    "sigma": "leakage of the adaptation",
+}  # fmt: skip
+#: Key of a stroke by the unit of the first state.
+STROKE = {"m": "stroke_m", "rad": "stroke_rad", "m/s": "stroke_m_s", "rad/s": "stroke_rad_s"}
+
+
+def stroke_of(section: dict[str, Any], unit: str) -> Any:
+    """The range of the first state, in its unit."""
+    need(unit in STROKE, f"the first state must be in {', '.join(STROKE)}: got {unit!r:.20}")
+    given = [key for key in STROKE.values() if key in section]
+    need(given == [STROKE[unit]], f"the study must give {STROKE[unit]}, and no other stroke")
+    return section[STROKE[unit]]
+
+
+def consistent(data: dict[str, Any], entry: dict[str, Any], claim: Claim) -> None:
+    """Refuse facts about a member that contradict each other."""
+    study = data["study"]
+    section = study["plant"]["joints"][claim.name]
+    units = {row["state"]: row["unit"] for row in claim.rows}
+    _units(claim, units)
+    _nominal(claim, section, study)
+    _assumed(entry, claim, study, section, units)
+    _gains(entry, claim, units)
+    _terms(claim, study)
+    _bundled(section)
+    derivatives, own = ["", "/s", "/s^2", "/s^3"], claim.rows[0]["unit"].removesuffix("/s")
+    first = 1 if claim.rows[0]["unit"].endswith("/s") else 0
+    names = ("position", "speed", "acceleration", "jerk")
+    for k, bound in enumerate(entry["reference"]["derivative_bounds"]):
+        unit = own + [*derivatives, "/s^4"][first + k]
+        need((bound["name"], bound["unit"]) == (names[k], unit), f"derivative {k} of the reference is in {unit}")
+    golden = [tuple(map(tuple, (v["x"], v["r"], v["theta"]))) for v in entry["golden"]]
+    need(len(set(golden)) == len(golden), "golden vectors must differ from each other")
+
+
+def _units(claim: Claim, units: dict[str, str]) -> None:
+    """A limit is in the unit of what it limits; a rate in that of what it is the rate of."""
+    amplitude = claim.limits[0]["unit"]
+    for limit in claim.limits:
+        for signal in limit["signals"]:
+            need(
+                limit["unit"] == units.get(signal, amplitude),
+                f"the limit on {limit['name']} has the unit of no {signal}",
+            )
+    first, second = claim.rows[0], claim.rows[1] if len(claim.rows) > 1 else None
+    if claim.first == "position" and second is not None:
+        need(second["unit"] == f"{first['unit']}/s", f"{second['state']} must be in {first['unit']}/s")
+    fits = first["unit"].endswith("/s") == (claim.first == "speed")
+    need(fits, f"a {claim.first} cannot be in {first['unit']}")
+
+
+def _nominal(claim: Claim, section: dict[str, Any], study: dict[str, Any]) -> None:
+    """What the law takes for the plant are the study's values; for a load, one of its range."""
+    for name, value in claim.nominal.items():
+        if name in section["parameters"]:
+            stated = number(section["parameters"][name]["value"], name)
+            need(value == stated, f"the nominal value of {name} is not the study's")
+        elif name in claim.parameters:
+            low, high = claim.parameters[name]
+            need(low <= value <= high, f"the nominal value of {name} is outside its range")
+        else:
+            given = study["uncertainty"]["disturbances"].get(name)
+            low, high = claim.disturbances[name] if given is None else [number(v, name) for v in given["range"]]
+            unknown = given is None and value == 0  # the load of a coupling that the law does not know
+            need(unknown or low <= value <= high, f"the nominal value of {name} is outside its range")
+
+
+def _assumed(
+    entry: dict[str, Any], claim: Claim, study: dict[str, Any], section: dict[str, Any], units: dict[str, str]
+) -> None:
+    """Units and sources of the assumptions."""
+    load = {name: d["unit"] for name, d in study["uncertainty"]["disturbances"].items()}
+    for given in entry["assumptions"]:
+        kind, _, name = given["name"].partition(".")
+        stated = section["parameters"].get(name)
+        if kind == "parameter" and stated is not None:
+            wanted = stated["unit"], stated["source"]
+        elif kind == "parameter":  # effectiveness, or a member's own part of the inertia of a machine's bodies
+            wanted = ("1", given["source"]) if name not in CARRIED else (given["unit"], "derived")
+            need(given["source"] in ("derived", "assumed"), f"{given['name']} has another source")
+        elif kind in ("noise", "initial"):
+            wanted = units[name], "study"
+        elif kind == "feedforward_rate":
+            own = next(e["unit"] for e in entry["assumptions"] if e["name"] == f"feedforward.{name}")
+            wanted = f"{own}/s", "study"
+        else:
+            wanted = load.get(name, given["unit"]), "study"
+        need((given["unit"], given["source"]) == wanted, f"{given['name']} must be in {wanted[0]}, source {wanted[1]}")
+
+
+def _gains(entry: dict[str, Any], claim: Claim, units: dict[str, str]) -> None:
+    """Units and meanings of the gains: β maps Q to what the row asks for, ε θ̂ has the unit of β."""
+    order = [f"{kind}_{k + 1}" for k in range(len(claim.controlled)) for kind in MEANINGS]
+    need([gain["name"] for gain in entry["gains"]] == order, "the gains stand in another order")
+    for gain in entry["gains"]:
+        kind, _, place = gain["name"].partition("_")
+        row = claim.controlled[int(place) - 1]
+        state = claim.rows[row]["state"]
+        following = [units[r["state"]] for r in claim.rows if r["target"] == row]
+        ratio = f"({following[0] if following else claim.limits[0]['unit']})/({units[state]})"
+        unit = {"beta": ratio, "epsilon": f"sqrt({ratio}/s)/({units[state]})", "delta": "1", "sigma": "1/s"}[kind]
+        need(gain["unit"] == unit, f"{gain['name']} must be in {unit}")
+        need(
+            gain["meaning"] == f"{MEANINGS[kind]} of subsystem {place} ({state})",
+            f"{gain['name']} means something else",
+        )
+
+
+def _terms(claim: Claim, study: dict[str, Any]) -> None:
+    """A law without modelling terms knows nothing but the rate of its reference."""
+    modelling = study["controller"]["modelling"]
+    need(len(set(modelling)) == len(modelling), "a modelling term stands twice")
+    need(all(NAME.fullmatch(term) for term in modelling), "a modelling term must be a plain name")
+    for k, term in enumerate(claim.law if not modelling else []):
+        allowed = {"r1"} if k == 0 and claim.first == "position" else set()
+        need(reads(term) <= allowed, "the law models something, and the study names no modelling term")
+
+
+def _bundled(section: dict[str, Any]) -> None:
+    """What a study left to the bundled machine is named once, and there."""
+    given = section.get("bundled", [])
+    known = {*section["parameters"], *section.get("ratings", {}), *(f"{name} limit" for name in section["limits"])}
+    need(
+        len(set(given)) == len(given) and set(given) <= {*known, "stroke"}, "bundled names what the study does not have"
+    )
+
+
+def met(data: dict[str, Any], certified: dict[str, Fraction]) -> None:
+    """Refuse requirements that are not the study's or not met, and records that the proof excludes.
+
+    Args:
+        data: The file.
+        certified: What is proved, by the name of the requirement.
+    """
+    kept = ("member_error", "settling_band_m")
+    wanted = {key: value for key, value in data["study"]["requirements"].items() if key not in kept}
+    if len(data["members"]) > 1:
+        wanted |= {f"member_error.{k}": v for k, v in data["study"]["requirements"]["member_error"].items()}
+    rows = data["validation"]["requirements"]
+    need([row["name"] for row in rows] == list(wanted), "the requirements are not those of the study")
+    for row in rows:
+        name, limit, seen = row["name"], number(row["required"], "required"), number(row["simulated"], "simulated")
+        need(limit == number(wanted[name], name), f"{name} is required otherwise in the study")
+        need(0 <= seen <= limit, f"{name} is not met by the recorded runs")
+        if name in certified:
+            need(row["certified"] is not None, f"{name} is proved, and the file does not say so")
+            told = number(row["certified"], "certified")
+            need(certified[name] <= told <= limit, f"{name} states another bound than is proved")
+            need(seen <= told, f"a recorded run passes what is proved of {name}")
+        else:
+            need(row["certified"] is None, f"{name} is stated as proved, and is not")
+    _records(data, certified)
+
+
+def _records(data: dict[str, Any], certified: dict[str, Fraction]) -> None:
+    """Records that the proof excludes, or that contradict each other."""
+    shown, study = data["validation"], data["study"]
+    late = number(shown["largest_error_after_transient_m"], "largest_error_after_transient_m")
+    need(
+        0 <= late <= number(shown["largest_error_m"], "largest_error_m"), "an error after the transient is the largest"
+    )
+    need(late <= certified["tracking_error_m"], "a recorded run passes what is proved of the output")
+    need(set(shown["members"]) == {entry["name"] for entry in data["members"]}, "records are of the members")
+    for entry in data["members"]:
+        own = shown["members"][entry["name"]]
+        need(own["unit"] == entry["model"]["rows"][0]["unit"], "a record is in the unit of its member")
+        ends = [number(own[key], key) for key in ("largest_error_after_transient", "largest_error")]
+        need(0 <= ends[0] <= ends[1], "an error after the transient is larger than the largest")
+        bound = certified.get(f"member_error.{entry['name']}", certified["tracking_error_m"])
+        need(ends[0] <= bound, f"a recorded run passes what is proved of {entry['name']}")
+        watched = study["controller"].get("observer") is not None
+        need(("estimates" in own) == watched, "estimates are recorded where there is an observer, and only there")
+        noise = {a["name"]: a["upper"] for a in entry["assumptions"]}
+        for row, seen in zip(entry["model"]["rows"], own.get("estimates", []), strict=False):
+            inside = number(seen, "an estimate") <= number(noise[f"noise.{row['state']}"], "noise")
+            need(inside, f"a recorded estimate of {entry['name']} passes what is proved")
+    names = [scenario["name"] for scenario in study["validation"]["scenarios"]]
+    need([run["name"] for run in shown["scenarios"]] == names, "the recorded scenarios are not those of the study")
+    drawn = shown["monte_carlo"]
+    need(drawn is None or drawn["met"] == drawn["runs"], "a random run missed a requirement")
+    need(number(shown["integration_error_m"], "integration_error_m") >= 0, "an error must not be negative")
+
+
+# --- course ---
+
+#: A place is met and a duration kept to this share of its size; a limit to this share.
+MET = Fraction(1, 10**9)
+
+
+def follows(data: dict[str, Any], entry: dict[str, Any], claim: Claim, which: int) -> None:
+    """Refuse a reference that is not the study's.
+
+    Args:
+        data: The file.
+        entry: The entry of a member.
+        claim: The statement about it.
+        which: Its place among the members.
+    """
+    section = data["study"]["reference"]
+    count = len(data["members"])
+    places = [numbers(place, count, "a waypoint")[which] for place in section["waypoints"]]
+    pause, pace = number(section["dwell_s"], "dwell_s"), number(section["pace"], "pace")
+    need(0 < pace <= 1 and pause >= 0, "the pace must be in (0, 1], a pause not negative")
+    segments = entry["reference"]["segments"]
+    moves = segments[1::2] if pause > 0 else segments
+    still = segments[::2] if pause > 0 else []
+    need(len(moves) == len(places) - 1, f"the reference must make {len(places) - 1} moves: got {len(moves)}")
+    need(not pause or len(still) == len(places), "the reference must rest before, between and after its moves")
+    for segment, place in zip(still, places, strict=False):
+        knots, points = _of(segment)
+        need(_close(knots[-1] - knots[0], pause), f"the reference must rest for {float(pause):g} s")
+        need(len(set(points)) == 1 and _close(points[0], place), f"the reference must rest at {float(place):g}")
+    durations = section["durations_s"]
+    timed = section["kind"] == "quintic" or section["objective"] == "energy"
+    need(len(durations) == (len(moves) if timed else 0), "the study does not give the durations of the moves")
+    for k, segment in enumerate(moves):
+        knots, points = _of(segment)
+        need(_close(points[0], places[k]) and _close(points[-1], places[k + 1]), f"move {k + 1} misses its waypoints")
+        at_rest = points[0] == points[1] == points[2] and points[-1] == points[-2] == points[-3]
+        need(at_rest, f"move {k + 1} is not from rest to rest")
+        need(section["kind"] != "quintic" or _quintic(knots, points), f"move {k + 1} is not a quintic")
+        lasted = (knots[-1] - knots[0]) * pace
+        if timed:
+            need(
+                _close(lasted, number(durations[k], "a duration")), f"move {k + 1} lasts another time than the study's"
+            )
+        else:
+            need(lasted <= number(section["longest_s"], "longest_s") * (1 + MET), f"move {k + 1} lasts too long")
+    _limited(section, claim, segments)
+
+
+def _of(segment: dict[str, Any]) -> tuple[list[Fraction], list[Fraction]]:
+    count = len(segment["coefficients"])
+    return numbers(segment["knots"], count + 6, "knots"), numbers(segment["coefficients"], count, "coefficients")
+
+
+def _close(value: Fraction, wanted: Fraction) -> bool:
+    return abs(value - wanted) <= MET * max(Fraction(1), abs(wanted))
+
+
+def _quintic(knots: list[Fraction], points: list[Fraction]) -> bool:
+    """Whether the control points are those of 10 s³ - 15 s⁴ + 6 s⁵: its symmetric multi-affine form at the knots."""
+    begin, lasted, way = knots[0], knots[-1] - knots[0], points[-1] - points[0]
+    for k, point in enumerate(points):
+        sums = [Fraction(1), *[Fraction(0)] * 5]  # elementary symmetric polynomials of five knots
+        for knot in knots[k + 1 : k + 6]:
+            share = (knot - begin) / lasted
+            sums = [sums[0], *(now + share * before for before, now in pairwise(sums))]
+        if abs(points[0] + way * (sums[3] - 3 * sums[4] + 6 * sums[5]) - point) > MET * abs(way):
+            return False
+    return True
+
+
+def _limited(section: dict[str, Any], claim: Claim, segments: list[dict[str, Any]]) -> None:
+    """The study's limits on speed, acceleration and jerk: by control points, or where these pass them by spans."""
+    given = section.get("limits")
+    if given is None:
+        return
+    first = 1 if claim.first == "position" else 0
+    keys = ("speed_m_s", "acceleration_m_s2", "jerk_m_s3")
+    for order, key in enumerate(keys, first):
+        limit = number(given[key], key)
+        need(limit > 0, f"{key} must be positive")
+        if not _inside(claim.reference[order], limit):
+            kept = all(_inside(piece[order], limit) for segment in segments for piece in _pieces(segment))
+            need(kept, f"the reference passes reference.limits.{key}")
+
+
+def _inside(found: Interval, limit: Fraction) -> bool:
+    return max(-found[0], found[1]) <= limit * (1 + MET)
+
+
+def _pieces(segment: dict[str, Any]) -> list[list[Interval]]:
+    knots, points = _of(segment)
+    spans = [k for k in range(5, len(knots) - 6) if knots[k] < knots[k + 1]]
+    return [ranges_on(knots, points, k, (knots[k], knots[k + 1])) for k in spans]
+
+
 # --- reading ---
 
 def read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
@@ -940,7 +1585,7 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     cells = [cell_of(cell, n) for cell in certificate["cells"]] if kind == "sampled" else []
     covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod(split)
     need(kind != "sampled" or covered, "the cells do not cover the inertias")
-    stroke = numbers(section["stroke"], 2, "stroke")
+    stroke = numbers(stroke_of(section, str(rows[0]["unit"])), 2, "stroke")
     return Claim(
         name=entry["name"], rows=rows, input_map=input_map, inputs=model["inputs"], plant=plant, law=terms,
         parameters=assumed["parameter"], disturbances=assumed["disturbance"], nominal=nominal,
@@ -1076,6 +1721,8 @@ def assumptions(
         bounds = found[kind][name]
         need(low <= high, f"the study's range of {name} is upside down")
         need(bounds[0] <= low and high <= bounds[1], f"the assumption {kind}.{name} is narrower than the study's")
+        room = ROUND * max(abs(low), abs(high))
+        need(low - bounds[0] <= room and bounds[1] - high <= room, f"the assumption {kind}.{name} is not the study's")
     if not coupled:
         disturbed = {name for kind, name, _, _ in stated if kind == "disturbance"}
         need(disturbed == set(found["disturbance"]), "the disturbances are not those of the study")
@@ -1637,13 +2284,29 @@ class Obligation:
 
 
 @dataclass(frozen=True)
+class Use:
+    """What is certified of a limit: share is the certified size over the limit."""
+
+    member: str
+    name: str
+    share: float
+
+
+@dataclass(frozen=True)
 class Report:
-    """The verdict on one file."""
+    """The verdict on one file: status 0 proved, 1 not proved, 2 unreadable.
+
+    `uses` are the shares of the limits, `bundled` what the study left to the bundled machine, `assumed` what has no
+    source.
+    """
 
     file: str
     status: int
     message: str
     obligations: list[Obligation] = field(default_factory=list)
+    uses: list[Use] = field(default_factory=list)
+    bundled: list[str] = field(default_factory=list)
+    assumed: list[str] = field(default_factory=list)
 
 
 def decided(name: str, statement: str, margin: Fraction, unit: str, remedy: str, *, member: str = "",
@@ -1651,8 +2314,39 @@ def decided(name: str, statement: str, margin: Fraction, unit: str, remedy: str,
     """An obligation, proved where its margin is positive, or zero where that is enough."""
     good = margin > 0 or (margin == 0 and not strict)
     size = Fraction(10) ** 300
-    shown = float(max(-size, min(size, margin)))
+    shown = below(max(-size, min(size, margin)))
     return Obligation(name, statement, shown, unit, "proved" if good else "undecided", "" if good else remedy, member)
+
+
+def below(x: Fraction) -> float:
+    """A float that is not above x."""
+    found = float(x)
+    return math.nextafter(found, -math.inf) if Fraction(found) > x else found
+
+
+def downward(x: Fraction | float, digits: int = 4) -> str:
+    """A margin in few digits, not above it."""
+    return _rounded(Fraction(x), digits, ROUND_FLOOR)
+
+
+def upward(x: Fraction | float, digits: int = 4) -> str:
+    """A bound in few digits, not below it."""
+    return _rounded(Fraction(x), digits, ROUND_CEILING)
+
+
+def _rounded(x: Fraction, digits: int, rounding: str) -> str:
+    context = Context(prec=digits, rounding=rounding)
+    return f"{float(context.divide(Decimal(x.numerator), Decimal(x.denominator))):.{digits}g}"
+
+
+def milli(bound: Fraction, unit: str) -> str:
+    """A bound in thousandths of its unit, four digits, rounded up."""
+    return f"{upward(1000 * bound)} m{unit}"
+
+
+def percent(share: Fraction | float, *, up: bool) -> str:
+    """A share in percent, three digits, rounded up or down."""
+    return f"{upward(100 * Fraction(share), 3) if up else downward(100 * Fraction(share), 3)} %"
 
 
 # --- composition ---
@@ -1781,14 +2475,17 @@ class Composed:
 
 # --- sampled ---
 
+#: What a cell costs for each of its vertices and a power of its rows, in products.
+CELL_COST = 10
+
+
 class Held:
     """Verdicts of a sampled certificate: each cell of the inertias' ranges by itself."""
 
     def __init__(self, claim: Claim, loop: Deviation) -> None:
         self.claim = claim
         size, uncertain = len(loop.mass), sum(low < high for low, high in loop.mass)
-        if len(claim.cells) * (2**uncertain + 8) * size**3 > MAX_VERTICES:
-            raise NotProvedError("the certificate has more cells and vertices than this checker takes on")
+        WORK.one(CELL_COST * len(claim.cells) * (2**uncertain + 8) * size**3)
         cuts = []
         for (low, high), count in zip(loop.mass, claim.split, strict=True):
             width = (high - low) / max(count, 1)
@@ -1836,6 +2533,122 @@ class Held:
             late = [min(r + s * left, p) for r, s, p in zip(cell.reach, cell.shape, cell.start, strict=True)]
             found.append(period.states(late)[i])
         return min(up(max(found) * claim.half_widths[i]), claim.half_widths[i])
+
+
+# --- golden ---
+
+def golden_agree(vectors: Any, claim: Claim) -> bool:
+    """The recorded input/output vectors follow from the gains and the law, to float accuracy."""
+    need(isinstance(vectors, list) and 20 <= len(vectors) <= 100, "golden must hold 20 to 100 vectors")
+    return all(_golden_one(vector, claim) for vector in vectors)
+
+
+def _golden_one(vector: dict[str, Any], claim: Claim) -> bool:
+    n, k = len(claim.rows), len(claim.controlled)
+    x, r, theta = (
+        [float(v) for v in numbers(vector[key], count, "golden")] for key, count in (("x", n), ("r", 4), ("theta", k))
+    )
+    named = {row["state"]: value for row, value in zip(claim.rows, x, strict=True)}
+    named |= {f"r{j}": value for j, value in enumerate(r)}
+    named |= {f"nominal.{name}": float(value) for name, value in claim.nominal.items()}
+    foreseen = numbers(vector.get("load", []), len(claim.feedforward), "golden")
+    named |= {f"nominal.{name}": float(value) for name, value in zip(claim.feedforward, foreseen, strict=True)}
+    virtual: dict[int, float] = {}
+    following: list[float] = []
+    for j, i in enumerate(claim.controlled):
+        target = claim.rows[i]["target"]
+        goal = r[0] if target == "reference" else 0.0 if target == "zero" else virtual[target]
+        beta, epsilon, delta, sigma = (float(g) for g in claim.gains[j])
+        error, program = x[i] - goal, claim.law[j]
+        term = walk(program, named.__getitem__, float, float_apply)[program["outputs"][0]]
+        virtual[i] = -(beta + epsilon * theta[j]) * error / 2 + term
+        step = epsilon * delta * error * error / 2 - delta * sigma * theta[j]
+        following.append(theta[j] + float(claim.period) * step)
+    wanted = [virtual[row] for row in claim.input_map]
+    norm, limit = math.hypot(*wanted), float(claim.limits[0]["value"])
+    wanted = [value * (limit / max(norm, limit)) for value in wanted]
+    pairs = list(zip(wanted, numbers(vector["u"], len(wanted), "golden"), strict=True))
+    pairs += zip(following, numbers(vector["theta_next"], k, "golden"), strict=True)
+    return all(math.isfinite(a) and abs(a - float(b)) <= 1e-8 * (1.0 + abs(a)) for a, b in pairs)
+
+
+def float_apply(operator: str, a: float, b: float = 0.0) -> float:
+    """Operations in floats."""
+    simple = {"add": a + b, "sub": a - b, "mul": a * b, "neg": -a, "sq": a * a}
+    if operator in simple:
+        return simple[operator]
+    if operator in ("sin", "cos"):
+        return math.sin(a) if operator == "sin" else math.cos(a)
+    return a / b if operator == "div" else math.tanh(a) if operator == "tanh" else math.sqrt(a)
+
+
+# --- effects ---
+
+#: Shares of the certified size of every state and input at which a plant is looked at, either way.
+SHARES = (0.0, 1e-3, 1e-2, 0.1, 1.0)
+
+
+def least_effect(claim: Claim, sizes: dict[str, float]) -> tuple[Fraction, str]:
+    """The smallest effect on a plant, relative to its row, of going through a stated range; and what has it.
+
+    A number without a range is moved by a percent; one that is zero is left out.
+
+    Args:
+        claim: The statement.
+        sizes: Size of every state and input over the certified set.
+    """
+    stated = {**claim.parameters, **claim.disturbances}
+    middle = {name: float((low + high) / 2) for name, (low, high) in stated.items()}
+    for name, (value, _) in claim.feedforward.items():
+        middle[name] = float(value[0] + value[1]) / 2
+    points = [{s: sign * share * v for s, v in sizes.items()} for sign in (-1.0, 1.0) for share in SHARES]
+    rates = [_rates(claim, {**middle, **point}) for point in points]
+    size = [max(max(abs(r[i]) for r in rates), 1e-300) for i in range(len(claim.rows))]
+    found: list[tuple[Fraction, str]] = []
+    for name, (low, high) in stated.items():
+        ends = _ends(low, high)
+        if ends is None:
+            continue
+        seen = 0.0
+        for point in points:
+            one, other = (_rates(claim, {**middle, **point, name: end}) for end in ends)
+            seen = max(seen, *(abs(a - b) / s for a, b, s in zip(one, other, size, strict=True)))
+        found.append((Fraction(seen), name))
+    return min(found, default=(Fraction(1), "nothing"))
+
+
+def _ends(low: Fraction, high: Fraction) -> tuple[float, float] | None:
+    if low < high:
+        return float(low), float(high)
+    return (float(low), float(low) * 1.01) if low else None
+
+
+def _rates(claim: Claim, values: dict[str, float]) -> list[float]:
+    n, entries = len(claim.rows), run(claim.plant, values.__getitem__)
+    return [entries[n + i] / entries[i] for i in range(n)]
+
+
+def run(program: dict[str, Any], read: Callable[[str], float]) -> list[float]:
+    """Outputs of an operation list in floats."""
+    WORK.one(1 + len(program["operations"]) // 16)
+    try:
+        entries = walk(program, read, float, float_apply)
+    except (ArithmeticError, ValueError):
+        raise NotProvedError("the model has no value at its operating points") from None
+    return [entries[i] for i in program["outputs"]]
+
+
+def felt(
+    program: dict[str, Any], middle: dict[str, float], ranges: Mapping[str, tuple[Fraction, ...]]
+) -> tuple[Fraction, str]:
+    """The smallest effect on the loads of a machine, relative to the largest, of going through each range."""
+    size = max(max(map(abs, run(program, middle.__getitem__))), 1e-300)
+    found: list[tuple[Fraction, str]] = []
+    for name, (low, high) in ranges.items():
+        if low < high:
+            one, other = (run(program, {**middle, name: float(end)}.__getitem__) for end in (low, high))
+            found.append((Fraction(max(abs(a - b) for a, b in zip(one, other, strict=True)) / size), name))
+    return min(found, default=(Fraction(1), "nothing"))
 
 
 # --- obligations ---
@@ -1910,7 +2723,6 @@ def vacuity(claim: Claim) -> Fraction:
 
 def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     """Decide every obligation of the law; with the closed loop, and the verdicts on it."""
-    WORK.begin(MAX_PRODUCTS)
     made: list[Obligation] = []
 
     def state(name: str, statement: str, margin: Fraction, unit: str, remedy: str, strict: bool = True) -> None:
@@ -1922,6 +2734,11 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     if made[0].verdict != "proved":
         raise NotProvedError("the certificate is about an empty set (obligation non-vacuity)")
     loop, verdict = judge(claim, ROUNDING)
+    sizes = {name: float(loop.signal(name)) for name in (*(row["state"] for row in claim.rows), *claim.inputs)}
+    effect, weakest = least_effect(claim, sizes)
+    moved = percent(effect, up=False)
+    statement = f"the plant feels everything that the study states, {weakest} the least: {moved} of what moves its row"
+    state("plant", statement, effect - LEAST_EFFECT, "1", f"a plant that feels {weakest}")
     span = claim.reference[0]
     inside = min(span[0] - claim.stroke[0], claim.stroke[1] - span[1])
     statement = "the reference is continuous to its acceleration, ends at rest and stays inside the stroke"
@@ -1931,7 +2748,8 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     state(name, statement, spare, "1/s", anew, False)
     state("invariance", "no trajectory from the initial set leaves the assumed box", verdict.invariance(), "1", anew)
     slack, unit, which = min(authority(claim, loop), key=lambda entry: entry[0] / scale(claim, entry[2]))
-    statement = f"every limit holds over the certified set; the tightest is {which}"
+    used = percent(1 - slack / scale(claim, which), up=True)
+    statement = f"every limit holds over the certified set; the tightest is {which}, of which {used} are used"
     state("authority", statement, slack, unit, f"a limit on {which} that is {float(-slack) * 1.001:.4g} {unit} wider")
     statement, spare = verdict.sampling()
     state("sampling", f"{statement} at {float(1 / claim.period):g} Hz", spare, "1", f"a faster rate, or {anew}")
@@ -1953,64 +2771,14 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
 
 
 def scale(claim: Claim, name: str) -> Fraction:
-    """The size of a limit, to compare margins of different units."""
-    return next((limit["value"] for limit in claim.limits if limit["name"] == name), claim.stroke[1] - claim.stroke[0])
+    """The size of a limit, to compare margins of different units: half the way for the stroke."""
+    half = (claim.stroke[1] - claim.stroke[0]) / 2
+    return next((limit["value"] for limit in claim.limits if limit["name"] == name), half)
 
 
-def milli(bound: Fraction, unit: str) -> str:
-    """A bound in thousandths of its unit, four digits, rounded up."""
-    exponent = 0
-    size = bound * 1000
-    while size >= 10_000:
-        size, exponent = size / 10, exponent + 1
-    while 0 < size < 1_000:
-        size, exponent = size * 10, exponent - 1
-    return f"{float(-(-size // 1)) * 10.0**exponent:.4g} m{unit}"
-
-
-# --- golden ---
-
-def golden_agree(vectors: Any, claim: Claim) -> bool:
-    """The recorded input/output vectors follow from the gains and the law, to float accuracy."""
-    need(isinstance(vectors, list) and 20 <= len(vectors) <= 100, "golden must hold 20 to 100 vectors")
-    return all(_golden_one(vector, claim) for vector in vectors)
-
-
-def _golden_one(vector: dict[str, Any], claim: Claim) -> bool:
-    n, k = len(claim.rows), len(claim.controlled)
-    x, r, theta = (
-        [float(v) for v in numbers(vector[key], count, "golden")] for key, count in (("x", n), ("r", 4), ("theta", k))
-    )
-    named = {row["state"]: value for row, value in zip(claim.rows, x, strict=True)}
-    named |= {f"r{j}": value for j, value in enumerate(r)}
-    named |= {f"nominal.{name}": float(value) for name, value in claim.nominal.items()}
-    foreseen = numbers(vector.get("load", []), len(claim.feedforward), "golden")
-    named |= {f"nominal.{name}": float(value) for name, value in zip(claim.feedforward, foreseen, strict=True)}
-    virtual: dict[int, float] = {}
-    following: list[float] = []
-    for j, i in enumerate(claim.controlled):
-        target = claim.rows[i]["target"]
-        goal = r[0] if target == "reference" else 0.0 if target == "zero" else virtual[target]
-        beta, epsilon, delta, sigma = (float(g) for g in claim.gains[j])
-        error, program = x[i] - goal, claim.law[j]
-        term = walk(program, named.__getitem__, float, float_apply)[program["outputs"][0]]
-        virtual[i] = -(beta + epsilon * theta[j]) * error / 2 + term
-        step = epsilon * delta * error * error / 2 - delta * sigma * theta[j]
-        following.append(theta[j] + float(claim.period) * step)
-    wanted = [virtual[row] for row in claim.input_map]
-    norm, limit = math.hypot(*wanted), float(claim.limits[0]["value"])
-    wanted = [value * (limit / max(norm, limit)) for value in wanted]
-    pairs = list(zip(wanted, numbers(vector["u"], len(wanted), "golden"), strict=True))
-    pairs += zip(following, numbers(vector["theta_next"], k, "golden"), strict=True)
-    return all(math.isfinite(a) and abs(a - float(b)) <= 1e-8 * (1.0 + abs(a)) for a, b in pairs)
-
-
-def float_apply(operator: str, a: float, b: float = 0.0) -> float:
-    """Operations in floats."""
-    simple = {"add": a + b, "sub": a - b, "mul": a * b, "neg": -a, "sq": a * a}
-    if operator in simple:
-        return simple[operator]
-    return a / b if operator == "div" else math.tanh(a) if operator == "tanh" else math.sqrt(a)
+def uses(claim: Claim, loop: Loop) -> list[Use]:
+    """The share of every limit that is certified to be used at most."""
+    return [Use(claim.name, name, -below(slack / scale(claim, name) - 1)) for slack, _, name in authority(claim, loop)]
 
 
 # --- member ---
@@ -2028,38 +2796,35 @@ class Member:
     made: list[Obligation]
     reached: tuple[Fraction, Fraction, Fraction] | None
     ultimate: Fraction
+    used: list[Use]
     failed: str
 
 
-def check_member(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Member:
+def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     """Re-prove one member under its own assumptions."""
+    entry = data["members"][which]
     claim = read(data, entry, coupled)
+    consistent(data, entry, claim)
+    follows(data, entry, claim, which)
     made, loop, verdict = obligations(claim)
     agree = golden_agree(entry["golden"], claim)
     seen = number(data["validation"]["members"][claim.name]["largest_error"], "largest_error")
     need(seen >= 0, "largest_error must not be negative")
     rate = number(entry["certificate"]["envelope"]["rate"], "rate")
-    failed = missing(data, REQUIRED[data["study"]["controller"]["law"]][claim.kind], claim.name)
+    required = REQUIRED[data["study"]["controller"]["law"]][claim.kind]
+    need(sorted(o.name for o in made) == sorted(required), "the checker has not decided what the law needs")
+    failed = ""
     wrong = [o for o in made if o.verdict != "proved"]
-    if not failed and wrong:
-        failed = f"{wrong[0].name} (margin {wrong[0].margin:.4g} {wrong[0].unit})"
-    elif not failed and not rate <= claim.decay / (2 if claim.kind == "composition" else 1):
+    if wrong:
+        failed = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"
+    elif not rate <= claim.decay / (2 if claim.kind == "composition" else 1):
         failed = "the envelope states a faster rate"
-    elif not failed and not agree:
+    elif not agree:
         failed = "the golden vectors do not follow from the gains and the law"
-    elif not failed and seen > claim.half_widths[0]:
+    elif seen > claim.half_widths[0]:
         failed = "the recorded simulation leaves the certified envelope"
     tube = tube_of(claim, verdict) if isinstance(verdict, Held) and len(claim.rows) > accelerating(claim) else None
-    return Member(claim.name, claim, loop, made, tube, verdict.ultimate(0), failed)
-
-
-def missing(data: dict[str, Any], required: Iterable[str], member: str) -> str:
-    """What to say of an obligation that the file does not record as proved, exactly once; empty where all are."""
-    recorded = [o["name"] for o in data["obligations"] if o["verdict"] == "proved" and o.get("member", "") == member]
-    for name in required:
-        if recorded.count(name) != 1:
-            return f"the file leaves out the obligation {name}"
-    return ""
+    return Member(claim.name, claim, loop, made, tube, verdict.ultimate(0), uses(claim, loop), failed)
 
 
 def tube_of(claim: Claim, verdict: Held) -> tuple[Fraction, Fraction, Fraction]:
@@ -2104,7 +2869,11 @@ def slices(together: list[Any], halvings: Any) -> Iterable[list[list[Interval]]]
     """Ranges of position … jerk of every member over slices of time: pieces between knots, each halved some times."""
     parts = 2 ** index(halvings, 9, "halvings")
     need(len({len(segments) for segments in together}) == 1, "the references of the members have different segments")
-    count = 0
+    count = sum(
+        parts if len(segment["coefficients"]) > 6 else 1
+        for segment in together[0] for a, b in pairwise(segment["knots"]) if a < b
+    )  # fmt: skip
+    need(count <= MAX_SLICES, f"the motion is cut into {count} slices, more than {MAX_SLICES}")
     for segments in zip(*together, strict=True):
         knots = [number(k, "a knot") for k in segments[0]["knots"]]
         for segment in segments[1:]:
@@ -2117,39 +2886,7 @@ def slices(together: list[Any], halvings: Any) -> Iterable[list[list[Interval]]]
             pieces = 1 if len(points[0]) == 6 else parts
             for k in range(pieces):
                 ends = low + (high - low) * Fraction(k, pieces), low + (high - low) * Fraction(k + 1, pieces)
-                count += 1
-                need(count <= MAX_SLICES, f"the motion is cut into more than {MAX_SLICES} slices")
                 yield [ranges_on(knots, own, span, ends) for own in points]
-
-
-def ranges_on(
-    knots: list[Fraction], points: list[Fraction], span: int, ends: tuple[Fraction, Fraction]
-) -> list[Interval]:
-    """Hulls of the Bezier points of position … jerk of a spline on a part of a span, by blossoms (Ramshaw 1989)."""
-    degree = 5
-    curve = [
-        blossom(knots, points, span, [ends[0]] * (degree - k) + [ends[1]] * k) for k in range(degree + 1)
-    ]  # fmt: skip
-    found = []
-    for order in range(4):
-        found.append((down(min(curve)), up(max(curve))))
-        curve = [(degree - order) * (b - a) / (ends[1] - ends[0]) for a, b in pairwise(curve)]
-    return found
-
-
-def blossom(knots: list[Fraction], points: list[Fraction], span: int, arguments: list[Fraction]) -> Fraction:
-    """The symmetric multi-affine form of a spline's piece."""
-    degree = len(arguments)
-    values = points[span - degree : span + 1]
-    for level, t in enumerate(arguments):
-        following = []
-        for j in range(degree - level):
-            first = knots[span - degree + level + 1 + j]
-            last = knots[span + 1 + j]
-            share = (t - first) / (last - first)
-            following.append(values[j] + share * (values[j + 1] - values[j]))
-        values = following
-    return values[0]
 
 
 # --- coupling ---
@@ -2215,6 +2952,12 @@ class Coupling:
         statement = f"the references of all {self.count} members share their knots"
         made.append(decided("motion", statement, Fraction(len(self.slices)), "slices", "references of one duration"))
         worst, which = self._loads()
+        middle = {name: float(low + high) / 2 for name, (low, high) in self.disturbed.items()}
+        along = {
+            name: float(sum(self.slices[len(self.slices) // 2][j][order])) / 2 for name, j, order in self.signals
+        }  # fmt: skip
+        effect, weakest = felt(self.loads, {**along, **middle}, self.disturbed)
+        need(effect > LEAST_EFFECT, f"the loads do not change with {weakest}")
         statement = f"what the members do to each other is inside what each was proved under; the tightest is {which}"
         remedy = "smaller guarantees, or gains that are proved under more load"
         made.append(decided("loads", statement, worst, "1", remedy))
@@ -2426,8 +3169,13 @@ def room_for(assumed: Fraction, error: Fraction) -> Fraction:
 
 # --- command ---
 
-def check_text(text: str, file: str = "") -> Report:
+def check_text(text: str, file: str = "", *, recorded: bool = True) -> Report:
     """Re-prove a gain file given as text.
+
+    Args:
+        text: The file.
+        file: Its name, for the report.
+        recorded: Whether what the file records of the obligations must be what is found.
 
     Returns:
         Status 0 proved, 1 not proved, 2 unreadable; with one line and the obligations.
@@ -2435,14 +3183,33 @@ def check_text(text: str, file: str = "") -> Report:
     try:
         data = parse(text)
         need(data.get("schema") == SCHEMA, wrong_schema(data.get("schema")))
+        shaped(data)
         check_digests(text)
-        return check_machine(data, file)
+        report = check_machine(data, file)
+        differs = remembered(data, report) if recorded and not report.status else ""
+        return replace(report, status=1, message=f"not proved: {differs}") if differs else report
     except UnreadableError as error:
         return Report(file, 2, f"unreadable: {error}")
     except NotProvedError as error:
         return Report(file, 1, f"not proved: {error}")
-    except (KeyError, TypeError, AttributeError, IndexError, ValueError, ZeroDivisionError, OverflowError) as error:
+    except RecursionError:
+        return Report(file, 2, "unreadable: the file is nested too deeply")
+    except (KeyError, TypeError, AttributeError, IndexError, ValueError, ArithmeticError) as error:
         return Report(file, 2, f"unreadable: a part of the gain file is missing or malformed: {error!r:.120}")
+
+
+def remembered(data: dict[str, Any], report: Report) -> str:
+    """What the file records otherwise than it is found; empty where nothing."""
+    told = data["obligations"]
+    for found, row in zip(report.obligations, told, strict=False):
+        for key in ("name", "member", "statement", "unit", "verdict"):
+            if row.get(key) != getattr(found, key):
+                return f"the file records another {key} of {found.name}"
+        if not isinstance(row.get("margin"), Fraction) or float(row["margin"]) != found.margin:
+            return f"the file records another margin of {found.name}"
+    if len(told) < len(report.obligations):
+        return f"the file leaves out the obligation {report.obligations[len(told)].name}"
+    return "" if len(told) == len(report.obligations) else "the file records an obligation that there is not"
 
 
 def check_machine(data: dict[str, Any], file: str) -> Report:
@@ -2466,9 +3233,10 @@ def check_machine(data: dict[str, Any], file: str) -> Report:
     need(all(entry["members"] == names for entry in couplings), "a coupling is of all members in their order")
     need(len(names) == 1 or bool(couplings), "members without a coupling are files of their own")
     made: list[Obligation] = []
+    WORK.begin(MAX_PRODUCTS)
     members = []
-    for entry in data["members"]:
-        member = check_member(data, entry, bool(couplings))
+    for which in range(len(names)):
+        member = check_member(data, which, bool(couplings))
         made += member.made
         if member.failed:
             where = f"{member.name}: " if len(names) > 1 else ""
@@ -2481,73 +3249,125 @@ def check_together(data: dict[str, Any], members: list[Member], made: list[Oblig
     """What joins the members: guarantees, coupling, observers; and the bound on the output."""
     WORK.begin(MAX_COUPLED)
     observing = data["study"]["controller"].get("observer") is not None
-    required = [*(COUPLED if data["couplings"] else ()), *(OBSERVED if observing else ())]
-    if required:
+    if data["couplings"] or observing:
         made.append(guarantees_kept(data, members))
     coupling = Coupling(data, data["couplings"][0], members) if data["couplings"] else None
     made += coupling.obligations() if coupling is not None else []
     made += [observed(data, members)] if observing else []
-    failed = missing(data, dict.fromkeys(required), "")
     wrong = [o for o in made if o.verdict != "proved"]
-    if failed or wrong:
-        return Report(
-            file, 1, f"not proved: {failed or f'{wrong[0].name} (margin {wrong[0].margin:.4g} {wrong[0].unit})'}", made
-        )
-    settled = float(members[0].claim.transient)
-    if coupling is None:
-        claim = members[0].claim
-        bound = milli(claim.ultimate[0], str(claim.rows[0]["unit"]))
-        return Report(file, 0, f"proved: |tracking error| <= {bound} from {settled:g} s on", made)
-    seen = number(data["validation"]["largest_error_m"], "largest_error_m")
-    need(seen >= 0, "largest_error_m must not be negative")
-    if seen > coupling.output([member.claim.half_widths[0] for member in members]):
+    if wrong:
+        text = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"
+        return Report(file, 1, f"not proved: {text}", made)
+    proved = {"tracking_error_m": members[0].claim.ultimate[0] if coupling is None else coupling.stated}
+    if len(members) > 1:
+        proved |= {f"member_error.{m.name}": m.claim.ultimate[0] for m in members}
+    met(data, proved)
+    reach = [member.claim.half_widths[0] for member in members]
+    inside = reach[0] if coupling is None else coupling.output(reach)
+    need(0 <= number(data["validation"]["largest_error_m"], "largest_error_m"), "an error must not be negative")
+    if number(data["validation"]["largest_error_m"], "largest_error_m") > inside:
         return Report(file, 1, "not proved: the recorded simulation leaves the certified envelope", made)
-    bound = milli(coupling.stated, "m")
-    message = (
-        f"proved: |tracking error of the output| <= {bound} from {settled:g} s on, all {len(members)} members together"
-    )
-    return Report(file, 0, message, made)
+    settled, unit = float(members[0].claim.transient), str(members[0].claim.rows[0]["unit"])
+    bound = milli(proved["tracking_error_m"], unit if coupling is None else "m")
+    of = "" if coupling is None else f" of the output, all {len(members)} members together"
+    message = f"proved: |tracking error{of}| <= {bound} from {settled:g} s on"
+    used = [use for member in members for use in member.used]
+    return Report(file, 0, message, made, used, *unsourced(data))
+
+
+def unsourced(data: dict[str, Any]) -> tuple[list[str], list[str]]:
+    """What the study left to the bundled machine, and what is assumed."""
+    joints = data["study"]["plant"]["joints"]
+    bundled, assumed = [], []
+    for member, section in joints.items():
+        before = f"{member}." if len(joints) > 1 else ""
+        bundled += [before + name for name in section.get("bundled", [])]
+        for kind, after in (("parameters", ""), ("ratings", ""), ("limits", " limit")):
+            entries = section.get(kind, {}).items()
+            assumed += [before + name + after for name, entry in entries if entry["source"] == "assumed"]
+    return bundled, assumed
 
 
 def check_file(path: Path) -> Report:
     """Re-prove one file."""
+    shown = plainly(str(path))
     try:
-        if path.stat().st_size > MAX_BYTES:
-            return Report(str(path), 2, f"unreadable: a gain file has at most {MAX_BYTES} bytes")
-        return check_text(path.read_text(encoding="utf-8"), str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        return Report(str(path), 2, f"unreadable: {error}")
+        with path.open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+        if len(content) > MAX_BYTES:
+            return Report(shown, 2, f"unreadable: a gain file has at most {MAX_BYTES} bytes")
+        return check_text(content.decode("utf-8-sig"), shown)
+    except UnicodeDecodeError:
+        return Report(shown, 2, "unreadable: it is not UTF-8 text")
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else "no such file"
+        return Report(shown, 2, f"unreadable: {reason}")
+
+
+def plainly(text: str) -> str:
+    """Text without anything that a terminal would not print as it stands."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Check files; print one verdict a file and one line an obligation."""
+    """Check files: for each a verdict, with -v one line an obligation."""
     parser = argparse.ArgumentParser(description="Re-prove gain files from the files alone.")
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
     parser.add_argument("--json", action="store_true", help="print the verdicts as JSON")
+    parser.add_argument("-v", "--verbose", action="store_true", help="show every obligation")
     options = parser.parse_args(arguments)
     reports = [check_file(path) for path in options.files]
-    show(reports, as_json=options.json)
+    show(reports, as_json=options.json, verbose=options.verbose)
     return max(report.status for report in reports)
 
 
-def several(report: Report) -> bool:
-    """Whether a report is of more than one member."""
-    return len({o.member for o in report.obligations if o.member}) > 1
-
-
-def show(reports: list[Report], *, as_json: bool) -> None:
+def show(reports: list[Report], *, as_json: bool, verbose: bool = False) -> None:
     """Print the verdicts."""
     if as_json:
-        rows = [{**r.__dict__, "obligations": [o.__dict__ for o in r.obligations]} for r in reports]
+        kinds = ("obligations", "uses")
+        rows = [{**r.__dict__, **{k: [e.__dict__ for e in getattr(r, k)] for k in kinds}} for r in reports]
         print(json.dumps(rows, indent=1))
-    else:
-        for report in reports:
-            print(f"{report.file}: {report.message}")
-            for o in report.obligations:
-                name = f"{o.member}: {o.name}" if several(report) and o.member else o.name
-                print(f"  {o.verdict:9} {name:12} margin {o.margin:.4g} {o.unit}: {o.statement}")
-                if o.remedy:
-                    print(f"            would pass: {o.remedy}")
+        return
+    for report in reports:
+        print(f"{report.file}: {plainly(report.message)}")
+        for line in (*limit_lines(report), *source_lines(report)):
+            print(f"  {line}")
+        for line in obligation_lines(report, everything=verbose):
+            print(f"  {line}")
+
+
+def limit_lines(report: Report) -> list[str]:
+    """What is certified of the limits, in lines of a terminal."""
+    members = list(dict.fromkeys(use.member for use in report.uses))
+    lines = []
+    for member in members:
+        shares = ", ".join(f"{u.name} {percent(u.share, up=True)}" for u in report.uses if u.member == member)
+        before = f"{member}: " if len(members) > 1 else ""
+        lines += wrapped(f"{before}of its limits at most: {shares}")
+    return lines
+
+
+def source_lines(report: Report) -> list[str]:
+    """What the numbers rest on, in lines of a terminal."""
+    lines = wrapped(f"still the bundled machine's: {', '.join(report.bundled)}") if report.bundled else []
+    return lines + (wrapped(f"assumed: {', '.join(report.assumed)}") if report.assumed else [])
+
+
+def obligation_lines(report: Report, *, everything: bool) -> list[str]:
+    """Obligations, all or those that fail, in lines of a terminal."""
+    many = len({o.member for o in report.obligations if o.member}) > 1
+    lines = []
+    for o in report.obligations:
+        if everything or o.verdict != "proved":
+            name = f"{o.member}: {o.name}" if many and o.member else o.name
+            lines += wrapped(f"{o.verdict} {name}, margin {downward(o.margin)} {o.unit}: {o.statement}")
+            lines += wrapped(f"would pass: {o.remedy}", "    ") if o.remedy else []
+    return lines
+
+
+def wrapped(text: str, indent: str = "") -> list[str]:
+    """Lines of at most 78 columns."""
+    return textwrap.wrap(text, 76, initial_indent=indent, subsequent_indent=indent + "  ")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ def known(level):
     }
 
 
-def hub(level, parameters):
+def hub(level, parameters, ratings):
     values = {**known(level), **parameters}
     x, u, w = ca.SX.sym("x"), ca.SX.sym("u"), ca.SX.sym("w")
     p = ca.vertcat(*(ca.SX.sym(name) for name in values))
@@ -26,7 +26,7 @@ def hub(level, parameters):
         x=x, u=u, w=w, p=p, mass=q["inertia"], force=torque - q["damping"] * x - w,
         limits=(Limit(name="torque", signals=("torque",), value=60.0, unit="N m", source="assumed"),),
         stroke=(-30.0, 30.0), outputs={"torque": torque, "power": torque * x},
-        output_units={"torque": "N m", "power": "W"}, operating=(5.0,), load_unit="N m", first="speed",
+        output_units={"torque": "N m", "power": "W"}, load_unit="N m", first="speed",
     )  # fmt: skip
 
 

@@ -149,6 +149,7 @@ def claim_of(
 
 def verdict(claim: Claim) -> bool:
     """True where the checker proves every obligation."""
+    checker.WORK.begin(checker.MAX_PRODUCTS)
     try:
         return all(o.verdict == "proved" for o in checker.obligations(claim)[0])
     except checker.NotProvedError:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import BUDGET, JOBS, SEED, options_of
+from .inputs import study_of
+from .options import ALLOW_CODE, BUDGET, JOBS, QUIET_OPTION, SEED, options_of
 from .statuses import PROVED
 
 if TYPE_CHECKING:
@@ -21,25 +22,26 @@ if TYPE_CHECKING:
 @SEED
 @JOBS
 @BUDGET
-def command(study: str, output: Path | None, seed: int | None, jobs: int, budget: str) -> None:
+@ALLOW_CODE
+@QUIET_OPTION
+def command(study: str, output: Path | None, seed: int | None, jobs: int, budget: str, allow_code: bool) -> None:
     """Compare the law with its rivals on STUDY: equal tuning budget, same scenarios, same knowledge of the plant."""
-    sys.exit(run(study, output, options_of(jobs, None, seed, False, budget)))
+    sys.exit(run(study, output, options_of(jobs, None, seed, False, budget), allow_code))
 
 
-def run(name: str, output: Path | None, options: Options) -> int:
+def run(name: str, output: Path | None, options: Options, allow_code: bool) -> int:
     """Tune all, run all, show the table."""
     from ..design.compare import compare, table
     from ..design.options import effort_of
     from ..errors import InvalidInputError
     from ..files.seal import to_text
-    from ..files.sections import assumed_text
+    from ..files.sources import assumed_text
     from ..files.text import check_writable, write_text
     from ..problem import assemble
     from ..simulation import scenarios, within_assumptions
-    from ..study import load
     from .progress import bar
 
-    study = load(name)
+    study = study_of(name, allow_code)
     if output is not None:
         check_writable(output)
     problem, effort = assemble(study), effort_of(study, options)

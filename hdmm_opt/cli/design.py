@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .explain import explain, proved
-from .inputs import must_be_proved
-from .options import options_of, work
+from .inputs import must_be_proved, study_of
+from .options import VERBOSE, options_of, work
 from .statuses import NOT_PROVED, PROVED
 
 if TYPE_CHECKING:
     from ..design.options import Options
+    from ..files.result import Design
+    from ..study import Study
 
 NEEDED = "an actuator is exchanged in a proved file"
 
@@ -31,57 +33,72 @@ NEEDED = "an actuator is exchanged in a proved file"
     metavar="FILE MEMBER",
     help="For members that push each other: take FILE's proofs, prove anew only MEMBER, whose actuator is another.",
 )
+@VERBOSE
 @work
 def command(
-    study: str, output: Path | None, report: Path | None, exchange: tuple[Path, str] | None, **given: Any
+    study: str,
+    output: Path | None,
+    report: Path | None,
+    exchange: tuple[Path, str] | None,
+    allow_code: bool,
+    verbose: bool,
+    **given: Any,
 ) -> None:
     """Design gains for STUDY, a bundled name or a TOML file: reference, gains, proof, validation, gain file."""
-    sys.exit(run(study, output, report, options_of(**given), exchange))
+    sys.exit(run(study, output, report, options_of(**given), exchange, allow_code=allow_code, verbose=verbose))
 
 
 def run(
-    name: str, output: Path | None, report: Path | None, options: Options, exchange: tuple[Path, str] | None = None
-) -> int:
+    name: str, output: Path | None, report: Path | None, options: Options, exchange: tuple[Path, str] | None = None,
+    *, allow_code: bool = False, verbose: bool = False,
+) -> int:  # fmt: skip
     """Design, write the gain file or what a refusal leaves, and say so."""
-    from ..design.pipeline import design
-    from ..design.replacement import replace_actuator
     from ..files.rejected import rejected_document
-    from ..files.report import check_report, write_report
+    from ..files.report import PAGE_NAME, check_report, write_report
     from ..files.seal import to_text
-    from ..files.text import write_text
-    from ..study import load
-    from .outputs import beside, json_target, prepared_folder
-    from .progress import bar
+    from ..files.text import prepared_folder, write_text
+    from .outputs import beside, claimed, json_target
 
-    chosen = load(name)
+    chosen = study_of(name, allow_code)
     target = json_target(output, f"{chosen.study.name}.gains.json", "a gain file")
-    rejected = beside(target, ".rejected.json")
-    state = target.with_name(f".{target.name}.state")
+    rejected, state = beside(target, ".rejected.json"), target.with_name(f".{target.name}.state")
     if report is not None:
         check_report()
-        prepared_folder(report)
+        prepared_folder(report, PAGE_NAME)
     standing = None if exchange is None else _standing(exchange[0])
-    with bar() as progress:
-        if exchange is None or standing is None:
-            result = design(chosen, replace(options, state=state), progress)
+    with claimed(target):
+        result = _designed(chosen, replace(options, state=state), exchange, standing)
+        document = rejected_document(result) if result.document is None else result.document
+        write_text(rejected if result.document is None else target, to_text(document))
+        if result.document is None:
+            explain(result, rejected, target)
         else:
-            result = replace_actuator(standing, chosen, exchange[1], options, progress)
-            if result.report is not None and result.report.status != PROVED:
-                must_be_proved(exchange[0], NEEDED)
-    document = rejected_document(result) if result.document is None else result.document
-    write_text(rejected if result.document is None else target, to_text(document))
-    if result.document is None:
-        explain(result, rejected, target)
-    else:
-        rejected.unlink(missing_ok=True)
-        proved(result)
-    state.unlink(missing_ok=True)
+            rejected.unlink(missing_ok=True)
+            proved(result, verbose=verbose)
+        state.unlink(missing_ok=True)
     if report is not None:
         click.echo(f"report: {write_report(document, report)}", err=True)
     if result.document is None:
         return NOT_PROVED
     click.echo(str(target))
     return PROVED
+
+
+def _designed(
+    chosen: Study, options: Options, exchange: tuple[Path, str] | None, standing: dict[str, Any] | None
+) -> Design:
+    """The design, or the machine of a proved file with another actuator."""
+    from ..design.pipeline import design
+    from ..design.replacement import replace_actuator
+    from .progress import bar
+
+    with bar() as progress:
+        if exchange is None or standing is None:
+            return design(chosen, options, progress)
+        result = replace_actuator(standing, chosen, exchange[1], replace(options, state=None), progress)
+        if result.report is not None and result.report.status != PROVED:
+            must_be_proved(exchange[0], NEEDED)
+        return result
 
 
 def _standing(path: Path) -> dict[str, Any]:

@@ -1,10 +1,10 @@
-"""What a design says: what failed and what would do, or what is proved and at what price."""
+"""What a design says: the verdict first, then what it rests on; or what failed and what would do."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -24,22 +24,27 @@ def explain(result: Design, left: Path, target: Path) -> None:
     """
     done = result.report is not None and result.report.status == PROVED
     what = "proved, but a requirement is missed" if done else "not proved"
-    click.echo(f"{result.problem.study.study.name}: {what}; no gain file written", err=True)
+    _say(f"{result.problem.study.study.name}: {what}; no gain file written")
+    replayed = False
     for verdict in result.verdicts:
         margin = f"{verdict.margin:.4g} {verdict.unit}" if math.isfinite(verdict.margin) else "unknown"
         where = f"{verdict.member}: " if verdict.member else ""
-        click.echo(f"  {verdict.verdict}: {where}{verdict.name} (margin {margin})", err=True)
-        click.echo(f"    {verdict.statement}", err=True)
+        _say(f"{verdict.verdict}: {where}{verdict.name} (margin {margin})", 2)
+        _say(verdict.statement, 4)
         if verdict.remedy:
-            click.echo(f"    {'would pass' if verdict.sure else 'would help'}: {verdict.remedy}", err=True)
+            _say(f"{'would pass' if verdict.sure else 'would help'}: {verdict.remedy}", 4)
+        replayed = replayed or verdict.witness is not None
     for line in result.missed[:5]:
-        click.echo(f"  requirement missed: {line}", err=True)
+        _say(f"requirement missed: {line}", 2)
     if result.shown is not None:
-        click.echo("  what simulation says (it proves nothing):", err=True)
+        _say("what simulation says (it proves nothing):", 2)
         _runs(result)
-    click.echo(f"  details: {left}", err=True)
+    _sources(result)
+    _say(f"details: hdmm-opt report {left}", 2)
+    if replayed:
+        _say(f"the witness: hdmm-opt simulate {left} --scenario witness", 2)
     if target.exists():
-        click.echo(f"  {target} is from an earlier run, not of this design; it was left as it is", err=True)
+        _say(f"{target} is from an earlier run, not of this design; it was left as it is", 2)
 
 
 def _runs(result: Design) -> None:
@@ -48,70 +53,115 @@ def _runs(result: Design) -> None:
     problem, shown = result.problem, result.shown
     assert shown is not None
     for scenario, m in shown.runs:
-        note = "" if within_assumptions(problem, scenario) else "  (outside the assumptions)"
+        note = "" if within_assumptions(problem, scenario) else " (outside the assumptions)"
         if m.diverged:
-            click.echo(f"  {scenario.name}: lost at {m.diverged_s:.3g} s{note}", err=True)
+            _say(f"{scenario.name}: lost at {m.diverged_s:.3g} s{note}", 4)
             continue
-        parts = ", ".join(
-            f"{member.name} {1e3 * m.members[member.name].maximum_error:.4g} m{member.plant.state_units[0]}"
-            for member in problem.members
-        )
-        click.echo(
-            f"  {scenario.name}: output {1e3 * m.maximum_error_m:.4g} m{problem.machine.output_unit}; {parts}{note}",
-            err=True,
-        )
+        parts = [f"output {1e3 * m.maximum_error_m:.4g} m{problem.machine.output_unit}"]
+        for member in problem.members if len(problem.members) > 1 else ():
+            size = 1e3 * m.members[member.name].maximum_error
+            parts.append(f"{member.name} {size:.4g} m{member.plant.state_units[0]}")
+        _say(f"{scenario.name}: {', '.join(parts)}{note}", 4)
 
 
-def proved(result: Design) -> None:
-    """Say what is proved, what simulation shows beside it, and what is assumed."""
-    from ..files.junit import label
-    from ..files.read import certified_of, ultimate_of
-    from ..files.sections import assumed_text
-    from ..files.text import upward
+def proved(result: Design, *, verbose: bool = False) -> None:
+    """Say what is proved, what simulation shows beside it, and what it rests on.
 
-    document, report, problem = result.document, result.report, result.problem
+    Args:
+        result: A proved design.
+        verbose: Whether to show every obligation.
+    """
+    from stability import checker
+
+    report, document = result.report, result.document
     assert document is not None and report is not None
-    several = len(problem.members) > 1
-    click.echo(report.message, err=True)
-    for o in report.obligations:
-        if not (several and o.member):
-            name = label(o) if several else o.name
-            click.echo(f"  {o.verdict:8} {name:12} margin {o.margin:.4g} {o.unit}: {o.statement}", err=True)
-    for note in result.notes:
-        click.echo(note, err=True)
-    shown, bound = document["validation"], certified_of(document)
-    late, ratio = shown["largest_error_after_transient_m"], shown["bound_over_simulated"]
-    unit = f"m{problem.machine.output_unit}"
-    click.echo(
-        f"certified error {upward(bound * 1e3)} {unit}, largest simulated {late * 1e3:.4g} {unit} in "
-        f"{shown['simulated_runs']} runs" + (f": ratio {ratio:.3g}" if ratio else ""),
-        err=True,
-    )
-    for entry in document["members"] if several else []:
-        own, unit = shown["members"][entry["name"]], shown["members"][entry["name"]]["unit"]
-        seen, size = own["largest_error_after_transient"], upward(ultimate_of(entry) * 1e3)
-        click.echo(f"  {entry['name']}: certified {size} m{unit}, simulated {seen * 1e3:.4g}", err=True)
-    _estimates(result)
-    for row in shown["requirements"]:
-        click.echo(f"  {row['name']}: required {row['required']:g}, simulated {row['simulated']:.4g}", err=True)
+    _say(f"{result.problem.study.study.name}: {report.message}")
+    for line in checker.limit_lines(report):
+        _say(line, 2)
+    _errors(result, document)
+    _requirements(document)
     for name, entry in document["study"]["uncertainty"]["disturbances"].items():
-        unit = next(d.unit for d in problem.machine.disturbances if d.name == name)
         low, high = entry["range"]
-        click.echo(f"for {name} from {low:g} to {high:g} {unit}", err=True)
-    click.echo(f"assumed parameters, to be replaced by yours: {assumed_text(problem)}", err=True)
+        _say(f"for {name} from {low:g} to {high:g} {entry['unit']}", 2)
+    for line in (*_pinned(result), *result.notes):
+        _say(line, 2)
+    _sources(result)
+    if verbose:
+        for line in checker.obligation_lines(report, everything=True):
+            click.echo(f"  {line}", err=True)
 
 
-def _estimates(result: Design) -> None:
-    """The speed estimates of observers: certified and simulated."""
+def _sources(result: Design) -> None:
+    """What the study left to the bundled machine, and what is assumed."""
+    from ..files.sources import assumed_text, bundled_text
+
+    left = bundled_text(result.problem)
+    if left:
+        _say(left, 2)
+    _say(f"assumed, to be replaced by yours: {assumed_text(result.problem)}", 2)
+
+
+def _errors(result: Design, document: dict[str, Any]) -> None:
+    """Certified and simulated errors of the output, the members, and the speeds that are estimated."""
+    from ..files.read import certified_of, ultimate_of
     from ..files.text import upward
 
-    document = result.document
-    assert document is not None
-    for entry in document["members"]:
-        seen = document["validation"]["members"][entry["name"]].get("estimates")
-        if seen:
-            plant = result.problem.member(entry["name"]).plant
+    problem, shown = result.problem, document["validation"]
+    bound, late = certified_of(document), shown["largest_error_after_transient_m"]
+    ratio = f" (ratio {bound / late:.3g})" if late > 0 else ""
+    unit = f"m{problem.machine.output_unit}"
+    _say(
+        f"certified error {upward(bound * 1e3)} {unit}, largest in {shown['simulated_runs']} simulated runs "
+        f"{late * 1e3:.4g} {unit}{ratio}",
+        2,
+    )
+    for entry in document["members"] if len(document["members"]) > 1 else []:
+        own, plant = shown["members"][entry["name"]], problem.member(entry["name"]).plant
+        seen, size = own["largest_error_after_transient"], upward(ultimate_of(entry) * 1e3)
+        _say(f"{entry['name']}: certified {size} m{own['unit']}, simulated {seen * 1e3:.4g}", 4)
+        if "estimates" in own:
             speed, unit = plant.states[1], plant.state_units[1]
             bound = next(a["upper"] for a in entry["assumptions"] if a["name"] == f"noise.{speed}")
-            told = f"certified {upward(bound * 1e3)} m{unit}, simulated {seen[1] * 1e3:.4g}"
-            click.echo(f"  {entry['name']}: speed estimate {told}", err=True)
+            told = f"certified {upward(bound * 1e3)} m{unit}, simulated {own['estimates'][1] * 1e3:.4g}"
+            _say(f"{entry['name']}: speed estimate {told}", 4)
+
+
+def _requirements(document: dict[str, Any]) -> None:
+    """The requirements as a table; those that no run could have missed say so."""
+    from ..files.text import upward
+
+    wide = max(len(row["name"]) for row in document["validation"]["requirements"])
+    click.echo(f"  {'requirement':{wide}}  {'required':>10}  {'certified':>10}  {'simulated':>10}", err=True)
+    for row in document["validation"]["requirements"]:
+        certified = "-" if row["certified"] is None else upward(row["certified"])
+        line = f"  {row['name']:{wide}}  {row['required']:>10.4g}  {certified:>10}  {row['simulated']:>10.4g}"
+        vacuous = row["name"] == "settling_time_s" and row["simulated"] == 0
+        click.echo(line + ("  never outside its band" if vacuous else ""), err=True)
+
+
+def _pinned(result: Design) -> list[str]:
+    """Gains that the search left at an end of their range."""
+    found = []
+    for member in result.problem.members:
+        for gain, value in zip(member.ranges, result.gains[member.name], strict=True):
+            ends = {"lower": gain.low, "upper": gain.high}
+            for end, edge in ends.items() if not gain.fixed else ():
+                if abs(value / edge - 1) < PINNED:
+                    name = f"{member.name}.{gain.name}" if len(result.problem.members) > 1 else gain.name
+                    found.append(f"{name} = {value:g} ({end})")
+    return [f"at an end of their range, which may be too narrow: {', '.join(found)}"] if found else []
+
+
+#: A gain this close to an end of its range, relatively, is at it.
+PINNED = 0.005
+
+
+def _say(text: str, indent: int = 0) -> None:
+    """A line on stderr, wrapped to 80 columns."""
+    import textwrap
+
+    before = " " * indent
+    for line in textwrap.wrap(
+        text, 79, initial_indent=before, subsequent_indent=f"{before}  ", break_long_words=False, break_on_hyphens=False
+    ):
+        click.echo(line, err=True)

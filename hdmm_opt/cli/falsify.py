@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from .inputs import must_be_proved
-from .options import RESUME
+from .options import QUIET_OPTION, RESUME
 from .statuses import PROVED
 
 
@@ -18,6 +18,7 @@ from .statuses import PROVED
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the search.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Threads for the runs.")
 @RESUME
+@QUIET_OPTION
 def command(file: Path, budget: int, seed: int, jobs: int, resume: bool) -> None:
     """Search the worst load, parameters and start inside the assumptions of FILE, and keep the worst in it."""
     sys.exit(run(file, budget, seed, jobs=jobs, resume=resume))
@@ -25,36 +26,27 @@ def command(file: Path, budget: int, seed: int, jobs: int, resume: bool) -> None
 
 def run(path: Path, budget: int, seed: int, *, jobs: int = 1, resume: bool = False) -> int:
     """Attack a proved file, and write it with its worst run."""
-    from ..design.falsification import falsify
+    from ..design.attack import attacked
     from ..errors import DefectError
     from ..files.read import certified_of, read
-    from ..files.restore import offered, restored
     from ..files.seal import prove, to_text
-    from ..files.state import State
     from ..files.text import upward, write_text
-    from ..files.validation import contradiction, stored
+    from ..files.validation import stored
+    from .outputs import claimed
     from .progress import bar
 
     must_be_proved(path, "only a proved file can be attacked")
     document = read(path)
-    problem, gains = restored(document)
-    known = offered(document, problem)
-    loop = next(iter(known.values()))[0]
-    job = {"falsify": document["sha256"], "budget": budget, "seed": seed}
-    state = State(path.with_name(f".{path.name}.falsify.state"), job, resume=resume)
-    with bar() as progress:
-        progress.stage("falsify")
-        scenarios = [scenario for _, scenario in known.values()]
-        found = falsify(loop, gains, scenarios, budget, seed, progress.update, jobs=jobs, state=state)
-    broken = contradiction(document, found)
-    if broken is not None:
-        raise DefectError(f"{broken}; please report this file with seed {seed}")
-    finished, verdict = prove(stored(document, found))
-    if verdict.status != PROVED:
-        raise DefectError(f"the file is no longer proved with its witness: {verdict.message}")
-    # in this order: a file that is attacked already must not be attacked again by a resumed run
-    state.remove()
-    write_text(path, to_text(finished))
+    kept = path.with_name(f".{path.name}.falsify.state")
+    with claimed(path):
+        with bar() as progress:
+            problem, found = attacked(document, budget, seed, progress, jobs=jobs, kept=kept, resume=resume)
+        finished, verdict = prove(stored(document, found))
+        if verdict.status != PROVED:
+            raise DefectError(f"the file is no longer proved with its witness: {verdict.message}")
+        # in this order: a file that is attacked already must not be attacked again by a resumed run
+        kept.unlink(missing_ok=True)
+        write_text(path, to_text(finished))
     click.echo(f"{found.runs} runs, none outside the certified envelope (that proves nothing more)", err=True)
     late, bound = found.figures.maximum_error_m, certified_of(document)
     worst = finished["validation"]["largest_error_after_transient_m"]

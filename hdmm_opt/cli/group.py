@@ -13,6 +13,7 @@ from typing import Any
 
 import click
 
+from .inputs import INPUT
 from .statuses import INTERRUPTED, MISUSE, NOT_PROVED
 
 # The matrices here are small: threads of the linear algebra only get in the way of the search's own workers.
@@ -42,13 +43,17 @@ class _Group(click.Group):
         try:
             return super().invoke(ctx)
         except InvalidInputError as error:
-            click.echo(f"hdmm-opt: {error}", err=True)
+            given, text = ctx.meta.get(INPUT, ""), str(error)
+            click.echo(f"hdmm-opt: {text if given in text else f'{given}: {text}'}", err=True)
             sys.exit(MISUSE)
         except DefectError as error:
             click.echo(f"hdmm-opt: DEFECT of the prover: {error}", err=True)
             sys.exit(NOT_PROVED)
         except (KeyboardInterrupt, click.Abort):
-            click.echo("hdmm-opt: interrupted; nothing half-written; where there is --resume, go on with it", err=True)
+            verb = self.get_command(ctx, ctx.invoked_subcommand or "")
+            resumes = verb is not None and any(option.name == "resume" for option in verb.params)
+            advice = "; the same command with --resume goes on" if resumes else ""
+            click.echo(f"hdmm-opt: interrupted; nothing half-written{advice}", err=True)
             sys.exit(INTERRUPTED)
 
 

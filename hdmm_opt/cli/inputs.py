@@ -3,8 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
 
 from .statuses import PROVED
+
+if TYPE_CHECKING:
+    from ..study import Study
+    from ..study.motion import MotionStudy
+
+#: Where a verb keeps the name of what it reads, for messages.
+INPUT = "hdmm_opt.input"
+
+
+def study_of(name: str, allow_code: bool) -> Study:
+    """The study of a design; what is found wrong with it later names it too."""
+    from ..study import load
+
+    click.get_current_context().meta[INPUT] = name
+    return load(name, allow_code=allow_code)
+
+
+def any_study_of(name: str, allow_code: bool) -> Study | MotionStudy:
+    """The study of a design or of a motion alone."""
+    from ..study.read import load_any
+
+    click.get_current_context().meta[INPUT] = name
+    return load_any(name, allow_code=allow_code)
 
 
 def must_be_proved(path: Path, why: str) -> None:

@@ -6,6 +6,8 @@ from typing import Any
 
 import click
 
+from .statuses import QUIET
+
 BUDGET = click.option(
     "--budget", type=click.Choice(["quick", "full"]), default="quick", show_default=True,
     help="quick: as the study says; full: 50 x 100 candidates, and for a design 1000 random runs and 10000 attacks.",
@@ -19,9 +21,26 @@ JOBS = click.option(
 )  # fmt: skip
 
 
+ALLOW_CODE = click.option(
+    "--allow-code", is_flag=True, help='Let plant.model = "FILE.py:FUNCTION" of STUDY run that file.'
+)  # fmt: skip
+
+
+VERBOSE = click.option("-v", "--verbose", is_flag=True, help="Show every obligation with its margin.")
+
+
+def _be_quiet(context: click.Context, _: click.Parameter, value: bool) -> None:
+    context.meta[QUIET] = value
+
+
+QUIET_OPTION = click.option(
+    "-q", "--quiet", is_flag=True, expose_value=False, callback=_be_quiet, help="No progress on stderr."
+)
+
+
 def work(command: Any) -> Any:
     """The options of verbs that design."""
-    for option in (BUDGET, RESUME, SEED, CLUSTER, JOBS):
+    for option in (QUIET_OPTION, ALLOW_CODE, BUDGET, RESUME, SEED, CLUSTER, JOBS):
         command = option(command)
     return command
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import InvalidInputError
@@ -31,14 +34,29 @@ def beside(target: Path, ending: str) -> Path:
     return target.with_name(target.name.removesuffix(".json").removesuffix(".gains") + ending)
 
 
-def prepared_folder(folder: Path) -> None:
-    """Make a folder for a report.
+@contextmanager
+def claimed(target: Path) -> Iterator[None]:
+    """Hold a place to write while the block runs, so that no second run writes there.
+
+    The lock is the system's: it goes with the process, however that ends. Where there is none nothing is held.
 
     Raises:
-        InvalidInputError: it cannot be made, or not be written.
+        InvalidInputError: another run holds it.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidInputError(f"{folder}: cannot make that folder: {error.strerror}; choose another") from None
-    check_writable(folder / "report.html")
+        import fcntl
+    except ImportError:
+        yield
+        return
+    lock = target.with_name(f".{target.name}.lock")
+    handle = os.open(lock, os.O_CREAT | os.O_RDWR, 0o644)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(handle)
+        raise InvalidInputError(f"{target}: another run is writing it; wait for it, or give -o another name") from None
+    try:
+        yield
+    finally:
+        lock.unlink(missing_ok=True)
+        os.close(handle)

@@ -14,13 +14,13 @@ import click
 def command(file: Path, folder: Path) -> None:
     """Write the HTML page of FILE, a gain file or what a refusal left behind."""
     from ..files.read import read
-    from ..files.report import check_report, write_report
+    from ..files.report import PAGE_NAME, check_report, write_report
     from ..files.restore import whole
-    from .outputs import prepared_folder
+    from ..files.text import prepared_folder
 
     check_report()
     document = read(file)
-    prepared_folder(folder)
+    prepared_folder(folder, PAGE_NAME)
     with whole():
         target = write_report(document, folder)
     click.echo(str(target))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .inputs import study_of
 from .options import options_of, work
 from .statuses import PROVED
 
@@ -28,21 +29,20 @@ if TYPE_CHECKING:
 )
 @click.option("-o", "output", type=click.Path(path_type=Path), help="Table to write; STUDY.sweep.json by default.")
 @work
-def command(study: str, vary: tuple[str, ...], output: Path | None, **given: Any) -> None:
+def command(study: str, vary: tuple[str, ...], output: Path | None, allow_code: bool, **given: Any) -> None:
     """Design STUDY at every point of a grid of its numbers; what is proved where, and with which gains."""
-    sys.exit(run(study, vary, output, options_of(**given)))
+    sys.exit(run(study, vary, output, options_of(**given), allow_code))
 
 
-def run(name: str, vary: tuple[str, ...], output: Path | None, options: Options) -> int:
+def run(name: str, vary: tuple[str, ...], output: Path | None, options: Options, allow_code: bool) -> int:
     """Design all, write the table, show it."""
     from ..design.sweep import SCHEMA, axis, sweep
     from ..files.seal import to_text
     from ..files.text import write_text
-    from ..study import load
     from .outputs import json_target
     from .progress import bar
 
-    chosen = load(name)
+    chosen = study_of(name, allow_code)
     axes = [axis(text) for text in vary]
     target = json_target(output, f"{chosen.study.name}.sweep.json", "the table of a sweep")
     with bar() as progress:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .inputs import study_of
 from .options import options_of, work
 from .statuses import NOT_PROVED, PROVED
 
@@ -23,12 +24,12 @@ QUICK = (32, 25)
 @click.argument("study")
 @click.option("-o", "output", type=click.Path(path_type=Path), help="Set to write; STUDY.tradeoff.json by default.")
 @work
-def command(study: str, output: Path | None, **given: Any) -> None:
+def command(study: str, output: Path | None, allow_code: bool, **given: Any) -> None:
     """The Pareto set of STUDY's gains: simulated error, certified error, and the share of the limits they use."""
-    sys.exit(run(study, output, options_of(**given)))
+    sys.exit(run(study, output, options_of(**given), allow_code))
 
 
-def run(name: str, output: Path | None, options: Options) -> int:
+def run(name: str, output: Path | None, options: Options, allow_code: bool) -> int:
     """Search the set, write it, show it."""
     from ..design.evaluation import OBJECTIVES
     from ..design.options import FULL
@@ -37,11 +38,10 @@ def run(name: str, output: Path | None, options: Options) -> int:
     from ..files.seal import to_text
     from ..files.text import write_text
     from ..problem import assemble
-    from ..study import load
     from .outputs import json_target
     from .progress import bar
 
-    chosen = load(name)
+    chosen = study_of(name, allow_code)
     problem = assemble(chosen)
     if not problem.searched:
         raise InvalidInputError(f"{name}: a trade-off needs gains to search: all are fixed; give one min and max")

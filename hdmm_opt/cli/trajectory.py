@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .inputs import any_study_of
+from .options import ALLOW_CODE, QUIET_OPTION
 from .statuses import PROVED
 
 if TYPE_CHECKING:
@@ -17,20 +19,21 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("study")
 @click.option("-o", "output", type=click.Path(path_type=Path), help="Write the reference as JSON.")
-def command(study: str, output: Path | None) -> None:
+@ALLOW_CODE
+@QUIET_OPTION
+def command(study: str, output: Path | None, allow_code: bool) -> None:
     """Build the reference of STUDY alone, and show the limits that it respects."""
-    sys.exit(run(study, output))
+    sys.exit(run(study, output, allow_code))
 
 
-def run(name: str, output: Path | None) -> int:
+def run(name: str, output: Path | None, allow_code: bool) -> int:
     """Build references or motions, show them, write them."""
     from ..files.seal import to_text
     from ..files.text import check_writable, write_text
     from ..problem import assemble
     from ..study import Study
-    from ..study.read import load_any
 
-    chosen = load_any(name)
+    chosen = any_study_of(name, allow_code)
     if output is not None:
         check_writable(output)
     if isinstance(chosen, Study):

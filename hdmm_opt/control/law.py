@@ -89,6 +89,10 @@ class ProvableLaw(Law, Protocol):
         """Plant and law as data."""
         ...
 
+    def derived(self, rate: float, initial: Sequence[float]) -> dict[str, tuple[float, float]]:
+        """Ranges of gains that have no default and that a study leaves out: control rate in Hz, initial errors."""
+        ...
+
     def rows_of(self, values: Sequence[float]) -> tuple[Gains, ...]:
         """A vector of gains as the prover takes them, one for each controlled row."""
         ...

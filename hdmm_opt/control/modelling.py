@@ -15,7 +15,7 @@ from typing import Any
 from ..plants import Plant
 
 #: Electrical modelling terms, and the parameter that carries each.
-ELECTRICAL = {"resistance": "resistance", "back_emf": "flux", "decoupling": "inductance"}
+ELECTRICAL = {"resistance": "resistance", "back_emf": "torque_constant", "decoupling": "inductance"}
 #: Parameters of the plant that only the term "friction" compensates.
 FRICTION = ("screw_friction", "gear_loss", "coulomb_friction")
 #: Modelling terms that a study may ask for.

@@ -21,6 +21,8 @@ from ..plants import Plant
 from .law import GainSpec, limited
 from .modelling import check_modelling, modelling_term
 
+#: Ratio of the highest bandwidths of successive rows, and the lowest over the highest, where a study gives no range.
+SEPARATION, NARROWEST = 3.0, 1 / 500
 #: Gains of a controlled row: meaning, and value where a study leaves it out.
 KINDS: dict[str, tuple[str, float | None]] = {
     "beta": ("proportional gain", None),
@@ -101,6 +103,35 @@ class RAC:
             return "1" if kind == "delta" else "1/s"
         ratio = f"({control})/({own})"
         return ratio if kind == "beta" else f"sqrt({ratio}/s)/({own})"
+
+    def derived(self, rate: float, initial: Sequence[float]) -> dict[str, tuple[float, float]]:
+        """Ranges of the β that a study leaves out, from inertia, rate and limits.
+
+        A row's bandwidth ω = g β / (2 M) is searched between a fifth of a percent and all of the highest that sampling
+        leaves it: half the rate for the row of the input, and `SEPARATION` times less for each row before it. Where a
+        state has a limit, the initial error alone does not ask for more than that.
+
+        Args:
+            rate: Control rate, Hz.
+            initial: Bounds on the initial errors. Shape (n,).
+        """
+        plant, found = self.plant, {}
+        own = {limit.signals[0]: limit.value for limit in plant.limits if len(limit.signals) == 1}
+        for k, i in enumerate(self.controlled):
+            fastest = rate / 2 / SEPARATION ** self._behind(i)
+            scale = 2 * plant.inertia_over_gain(i)
+            low, high = scale * fastest * NARROWEST, scale * fastest
+            followers = [plant.states[j] for j, target in enumerate(plant.targets) if target == i]
+            limit = own.get(followers[0] if followers else plant.inputs[plant.input_map.index(i)])
+            if limit is not None and initial[i] > 0:
+                high = max(min(high, 2 * limit / initial[i]), 2 * low)
+            found[f"beta_{k + 1}"] = (float(f"{low:.3g}"), float(f"{high:.3g}"))
+        return found
+
+    def _behind(self, i: int) -> int:
+        """Controlled rows between a row and the input."""
+        following = [j for j in self.controlled if self.plant.targets[j] == i]
+        return 1 + self._behind(following[0]) if following else 0
 
     @property
     def states(self) -> int:

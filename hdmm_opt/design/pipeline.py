@@ -116,7 +116,7 @@ def finished(
 
 
 def _rates(problem: Problem, tuned: Tuned) -> str:
-    longest = longest_period(problem, tuned.gains)
-    if not longest > 0:
-        return "no control period was found at which a certificate without refinement holds"
+    own, longest = problem.period, longest_period(problem, tuned.gains)
+    if not longest > own:
+        return f"proved at a control period of {own * 1e3:.4g} ms ({1 / own:.4g} Hz); no longer one was found"
     return f"certified up to a control period of {longest * 1e3:.4g} ms ({1 / longest:.4g} Hz), not found beyond"

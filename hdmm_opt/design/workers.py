@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from tuning import Executor, executor
 from tuning.executors.executor import Make
 
 from ..errors import InvalidInputError
+from ..plants.own import allow, allowed
+
+
+def _with_code(code: tuple[tuple[str, Path], ...], make: Make, arguments: tuple[Any, ...]) -> Any:
+    """`make` in a process that may run the same plants of the user's own."""
+    for name, file in code:
+        allow(f"{file}:{name.rpartition(':')[2]}", file.parent, known_as=name)
+    return make(*arguments)
 
 
 def workers(make: Make, arguments: tuple[Any, ...], jobs: int, cluster: str | None) -> Executor:
@@ -17,7 +26,7 @@ def workers(make: Make, arguments: tuple[Any, ...], jobs: int, cluster: str | No
         InvalidInputError: Dask is not installed, or no scheduler answers at the address.
     """
     try:
-        return executor(make, arguments, jobs, cluster)
+        return executor(_with_code, (allowed(), make, arguments), jobs, cluster)
     except ImportError:
         raise InvalidInputError(
             '--cluster needs Dask, which is not installed; pip install "hdmm-opt[cluster]", or leave it out'

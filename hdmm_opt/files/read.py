@@ -64,13 +64,18 @@ def gains_of(document: Mapping[str, Any]) -> GainSet:
 def certified_of(document: Mapping[str, Any]) -> float:
     """The certified bound on the error of the output after the transient, m."""
     if document["couplings"]:
-        return float(Fraction(document["couplings"][0]["envelope"]["output"]))
+        return above(document["couplings"][0]["envelope"]["output"])
     return ultimate_of(document["members"][0])
 
 
 def ultimate_of(entry: Mapping[str, Any]) -> float:
     """The certified bound on the error of a member after the transient, in the unit of its first state."""
-    return float(Fraction(entry["certificate"]["envelope"]["ultimate"][0]))
+    return above(entry["certificate"]["envelope"]["ultimate"][0])
+
+
+def above(exact: str) -> float:
+    """A float that is not below an exact bound of a file."""
+    return -checker.below(-Fraction(exact))
 
 
 def references_of(document: Mapping[str, Any]) -> tuple[Reference, ...]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ..problem.resolved import resolved
 from .read import REJECTED
 from .result import Design
-from .sections import assumed
+from .sections import gains_data, model_data, reference_data
+from .sources import assumed
 
 
 def rejected_document(found: Design) -> dict[str, Any]:
@@ -15,10 +17,10 @@ def rejected_document(found: Design) -> dict[str, Any]:
     problem = found.problem
     return {
         "schema": REJECTED,
-        "study": problem.study.model_dump(mode="json", exclude_none=True),
+        "study": resolved(problem),
         "members": [
-            {"name": m.name, "gains": [{"name": g.name, "value": v}
-                                       for g, v in zip(m.ranges, found.gains[m.name], strict=True)]}
+            {"name": m.name, "model": model_data(m), "gains": gains_data(m, found.gains[m.name]),
+             "reference": reference_data(m.reference, m.plant.reference_units)}
             for m in problem.members
         ],
         "obligations": [

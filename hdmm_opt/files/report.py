@@ -16,6 +16,9 @@ from .restore import restored
 from .sections import assumptions_data, gains_data
 from .text import upward, write_text
 
+#: Name of the page in its folder.
+PAGE_NAME = "report.html"
+
 
 def check_report() -> None:
     """Refuse a report whose libraries are not installed.
@@ -83,7 +86,7 @@ def write_report(document: Mapping[str, Any], folder: Path) -> Path:
             {"member": prefix[m.name], **entry} for m in problem.members for entry in gains_data(m, gains[m.name])
         ],
     )  # fmt: skip
-    target = folder / "report.html"
+    target = folder / PAGE_NAME
     write_text(target, text)
     return target
 

@@ -14,12 +14,14 @@ from stability.networks.contracts import Contract, prove
 from stability.networks.coupling import Tube
 
 from ..errors import InvalidInputError
+from ..plants.own import own_name, record
 from ..problem import GainSet, Member, Problem, assemble
 from ..problem.problem import Contracts
 from ..problem.resolved import resolved
 from ..simulation import Loop, Scenario, scenarios
 from ..study import Study, validated
 from .read import gains_of, references_of, rejected
+from .recorded import recorded_plant
 from .sections import model_data, observer_data
 
 
@@ -40,9 +42,12 @@ def restored(document: Mapping[str, Any]) -> tuple[Problem, GainSet]:
         InvalidInputError: the machine of the file is not what this release makes of its study.
     """
     with whole():
-        if rejected(document):
-            return assemble(study_of(document)), gains_of(document)
+        name = document["study"]["plant"]["model"]
+        if isinstance(name, str) and own_name(name):
+            record(name, recorded_plant(document))
         problem = assemble(study_of(document), references_of(document))
+        if rejected(document):
+            return problem, gains_of(document)
         _same_machine(document, problem)
         return problem, _fitting(document)
 
@@ -99,8 +104,10 @@ def _same_machine(document: Mapping[str, Any], problem: Problem) -> None:
         made |= {"loads": problem.machine.expression.to_data(), "output": problem.machine.place_expression.to_data()}
         coupling = document["couplings"][0]
         given |= {"loads": coupling["loads"], "output": coupling["place"]}
+    foreign = own_name(problem.study.plant.model)
     for member, entry in zip(problem.members, document["members"], strict=True):
-        made[member.name], given[member.name] = model_data(member), entry["model"]
+        if not foreign:  # else it was made of that model
+            made[member.name], given[member.name] = model_data(member), entry["model"]
         made[f"nominal of {member.name}"], given[f"nominal of {member.name}"] = (
             dict(member.bounds.nominal),
             entry["nominal"],

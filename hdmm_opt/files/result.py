@@ -20,7 +20,7 @@ class Validation:
     Attributes:
         runs: Scenario and figures of every scenario of the study.
         worst: The corner of the assumptions with the largest error, and its figures; None where not asked.
-        monte_carlo: Numbers of runs and successes, interval of the success probability; None where not asked.
+        monte_carlo: Numbers of runs and of those that met every requirement; None where not asked.
         inside: Figures of all runs inside the assumptions.
         integration_error: Estimated error of the integration on the first scenario, m.
         missed: Requirements that one of them missed, as text.
@@ -28,7 +28,7 @@ class Validation:
 
     runs: tuple[tuple[Scenario, Figures], ...]
     worst: tuple[Scenario, Figures] | None
-    monte_carlo: dict[str, float] | None
+    monte_carlo: dict[str, int] | None
     inside: tuple[Figures, ...]
     integration_error: float
     missed: tuple[str, ...]

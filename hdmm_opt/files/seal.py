@@ -26,30 +26,16 @@ def _hashed(section: dict[str, Any]) -> dict[str, Any]:
 def prove(document: dict[str, Any]) -> tuple[dict[str, Any], checker.Report]:
     """Fill in the obligations with the checker's verdicts, and seal; the file is checked once.
 
-    The checker decides every obligation before it looks whether the file records it as proved, so its report on the
-    draft, in which all are recorded, is its report on the finished file: the two differ in statements and margins,
-    which it does not read.
+    What the file records of the obligations is what the checker found on a draft without them: it is the same on the
+    finished file, which differs in nothing else.
     """
-    law = document["study"]["controller"]["law"]
-    required = [
-        {"name": name, "member": entry["name"], "verdict": "proved"}
-        for entry in document["members"] for name in checker.REQUIRED[law][entry["certificate"]["kind"]]
-    ]  # fmt: skip
-    required += [{"name": name, "member": "", "verdict": "proved"} for name in _joining(document)]
-    report = checker.check_text(to_text(seal({**document, "obligations": required})))
+    report = checker.check_text(to_text(seal({**document, "obligations": []})), recorded=False)
     entries = [
         {"name": o.name, "member": o.member, "statement": o.statement, "margin": o.margin, "unit": o.unit,
          "verdict": o.verdict}
         for o in report.obligations
     ]  # fmt: skip
     return seal({**document, "obligations": entries}), report
-
-
-def _joining(document: dict[str, Any]) -> dict[str, None]:
-    """Obligations that join the members."""
-    observing = document["study"]["controller"].get("observer") is not None
-    names = [*(checker.COUPLED if document["couplings"] else ()), *(checker.OBSERVED if observing else ())]
-    return dict.fromkeys(names)
 
 
 def to_text(document: dict[str, Any]) -> str:

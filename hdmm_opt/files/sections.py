@@ -137,39 +137,27 @@ def coupling_data(problem: Problem, contracts: Contracts) -> list[dict[str, Any]
     """What the members do to each other, the output, and the bound on its error."""
     if problem.loads is None:
         return []
-    ultimates = np.array([contracts[m.name].certificate.ultimate[0] * (1 + ULTIMATE) for m in problem.members])
     return [{
         "members": list(problem.machine.members),
         "loads": problem.machine.expression.to_data(),
         "place": problem.machine.place_expression.to_data(),
         "halvings": HALVINGS,
-        "envelope": {"output": short(output_bound(problem, ultimates) * (1 + OUTPUT) + 1e-12, up=True)},
+        "envelope": {"output": stated_output(problem, contracts)},
     }]  # fmt: skip
+
+
+def stated_ultimate(contract: Contract) -> str:
+    """The bound on a member's error that its file states."""
+    return short(contract.certificate.ultimate[0] * (1 + ULTIMATE), up=True)
+
+
+def stated_output(problem: Problem, contracts: Contracts) -> str:
+    """The bound on the output's error that the file of a machine states."""
+    ultimates = np.array([contracts[m.name].certificate.ultimate[0] * (1 + ULTIMATE) for m in problem.members])
+    return short(output_bound(problem, ultimates) * (1 + OUTPUT) + 1e-12, up=True)
 
 
 def short(value: float, *, up: bool = False) -> str:
     """A short rational near a float, as "p/q" text; not below it where `up`."""
     context = Context(prec=DIGITS, rounding=ROUND_CEILING if up else ROUND_HALF_EVEN)
     return str(Fraction(context.create_decimal(Decimal(float(value)))))
-
-
-def assumed(problem: Problem) -> tuple[str, ...]:
-    """Everything that has no public source, by member and parameter."""
-    found, several = list(problem.machine.assumed), len(problem.members) > 1
-    for member in problem.members:
-        prefix = f"{member.name}." if several else ""
-        found += [f"{prefix}{key}" for key, p in member.plant.parameters.items() if p.source == "assumed"]
-        found += [f"{prefix}{limit.name} limit" for limit in member.plant.limits if limit.source == "assumed"]
-    return tuple(found)
-
-
-def assumed_text(problem: Problem) -> str:
-    """The same in one line, with the members of each parameter in brackets."""
-    members: dict[str, list[str]] = {}
-    for name in assumed(problem):
-        member, _, key = name.rpartition(".")
-        members.setdefault(key, []).append(member)
-    whole = list(problem.machine.members)
-    return ", ".join(
-        key if own == [""] else f"{key} ({'all' if own == whole else ', '.join(own)})" for key, own in members.items()
-    )

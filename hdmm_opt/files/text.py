@@ -52,3 +52,16 @@ def check_writable(path: Path) -> None:
         raise InvalidInputError(f"{path}: cannot write there: {error.strerror}; choose a writable folder") from None
     os.close(handle)
     Path(temporary).unlink()
+
+
+def prepared_folder(folder: Path, page: str) -> None:
+    """Make a folder for a page.
+
+    Raises:
+        InvalidInputError: it cannot be made, or the page not be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"{folder}: cannot make that folder: {error.strerror}; choose another") from None
+    check_writable(folder / page)

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import json
-import math
 from fractions import Fraction
 from typing import Any
 
 from ..problem import Problem
-from ..problem.margins import certified_error
 from ..problem.problem import Contracts
-from ..simulation import Figures, Scenario, within_assumptions
+from ..simulation import Figures, Scenario
 from ..simulation.figures import plain
 from ..simulation.requirements import reached, required
-from .read import certified_of, ultimate_of
+from .read import above, certified_of, ultimate_of
 from .result import Validation, Witness
+from .sections import stated_output, stated_ultimate
 
 
 def to_data(problem: Problem, shown: Validation, contracts: Contracts) -> dict[str, Any]:
     """The section of a design."""
-    bound, late = certified_error(problem, contracts), shown.largest_late_error
     members = {}
     for member in problem.members:
         own = [m.members[member.name] for m in shown.inside]
@@ -32,27 +30,26 @@ def to_data(problem: Problem, shown: Validation, contracts: Contracts) -> dict[s
         }
     return plain({
         "requirements": requirements(problem, shown, contracts),
-        "scenarios": [_entry(s, m, within_assumptions(problem, s)) for s, m in shown.runs],
-        "worst_case": _entry(*shown.worst, True) if shown.worst else None,
+        "scenarios": [{"name": s.name, "figures": m.to_data()} for s, m in shown.runs],
+        "worst_case": _worst(*shown.worst) if shown.worst else None,
         "monte_carlo": shown.monte_carlo,
         "simulated_runs": len(shown.inside),
         "integration_error_m": shown.integration_error,
         "largest_error_m": shown.largest_error,
-        "largest_error_after_transient_m": late,
-        "bound_over_simulated": bound / late if late > 0 else None,
+        "largest_error_after_transient_m": shown.largest_late_error,
         "members": members,
     })  # fmt: skip
 
 
-def _entry(scenario: Scenario, figures: Figures, inside: bool) -> dict[str, Any]:
-    return {"scenario": scenario.to_data(), "within_assumptions": inside, "figures": figures.to_data()}
+def _worst(scenario: Scenario, figures: Figures) -> dict[str, Any]:
+    return {"scenario": scenario.to_data(), "figures": figures.to_data()}
 
 
 def requirements(problem: Problem, shown: Validation, contracts: Contracts) -> list[dict[str, Any]]:
     """Each requirement: required, simulated, and certified where it is proved."""
-    ultimates = {name: float(contract.certificate.ultimate[0]) for name, contract in contracts.items()}
-    proved = {"tracking_error_m": certified_error(problem, contracts)}
-    proved |= {f"member_error.{name}": ultimate for name, ultimate in ultimates.items()}
+    ultimates = {name: above(stated_ultimate(contract)) for name, contract in contracts.items()}
+    output = next(iter(ultimates.values())) if problem.loads is None else above(stated_output(problem, contracts))
+    proved = {"tracking_error_m": output, **{f"member_error.{name}": size for name, size in ultimates.items()}}
     return [
         {"name": name, "required": limit, "simulated": reached(problem, name, shown.inside),
          "certified": proved.get(name)}
@@ -79,7 +76,7 @@ def contradiction(document: dict[str, Any], witness: Witness) -> str | None:
 def stored(document: dict[str, Any], witness: Witness) -> dict[str, Any]:
     """A gain file's document with the witness as its worst case, where it is worse than the one there."""
     shown = dict(document["validation"])
-    late, bound = witness.figures.maximum_error_m, certified_of(document)
+    late = witness.figures.maximum_error_m
     shown["simulated_runs"] = shown.get("simulated_runs", 0) + witness.runs
     shown["largest_error_m"] = max(shown["largest_error_m"], witness.largest_error)
     shown["members"] = {
@@ -87,7 +84,6 @@ def stored(document: dict[str, Any], witness: Witness) -> dict[str, Any]:
         for name, entry in shown["members"].items()
     }
     if late >= shown["largest_error_after_transient_m"]:
-        shown["worst_case"] = _entry(witness.scenario, witness.figures, True)
+        shown["worst_case"] = _worst(witness.scenario, witness.figures)
         shown["largest_error_after_transient_m"] = late
-        shown["bound_over_simulated"] = bound / late if late > 0 and math.isfinite(late) else None
     return {**document, "validation": plain(shown)}

@@ -12,10 +12,10 @@ import casadi as ca
 
 from ..errors import InvalidInputError, RefusedKeyError
 from ..names import nearest
-from ..plants import Limit, Plant
+from ..plants import EFFECTIVENESS, Limit, Plant, effectiveness
 from ..plants.rigid_joint import UNITS, joint_parameters, rigid_joint
 from .machine import Disturbance, Machine
-from .model import Model, no_place, numbers_of
+from .model import STROKE, Model, no_place
 from .rigid_body import Payload, inverse_dynamics, pose
 from .urdf import Body, bodies
 
@@ -97,7 +97,12 @@ def _driven(body: Body, name: str, section: Any, damping: float) -> Plant:
     widest = 2 * math.pi if body.kind == "revolute" else FARTHEST
     travel = (max(body.limits[0], -widest), min(body.limits[1], widest))
     plant = rigid_joint(body.kind, parameters, torque=limit, speed=speed.value, travel=travel)
-    return numbers_of(plant, section, section.least_effectiveness)
+    strokes = [getattr(section, key) for key in STROKE.values() if getattr(section, key) is not None]
+    return plant.with_values(
+        parameters={} if section.least_effectiveness is None
+        else {EFFECTIVENESS: effectiveness(section.least_effectiveness)},
+        stroke=strokes[-1] if strokes else None,
+    )  # fmt: skip
 
 
 def _damping(section: Any, shared: float) -> tuple[float, float, str]:
@@ -119,7 +124,8 @@ def _urdf(name: str) -> str:
 
 
 def _check(section: Any) -> None:
-    no_place(section, ("level", "locked", "parameters", "least_lever_m_rad"), "arm")
+    elsewhere = ("parameters", "ratings", "limits", *STROKE.values())
+    no_place(section, ("level", "locked", "least_lever_m_rad", *elsewhere), "arm")
     if section.urdf is None:
         raise RefusedKeyError("urdf", 'is required with model = "arm"', 'give a bundled name ("crane") or a path')
     if not section.joints:

@@ -11,21 +11,26 @@ import casadi as ca
 from ..errors import RefusedKeyError
 from ..names import nearest
 from ..plants import Parameter, defaults, pmsm_emla
-from .crane_dynamics import JOINTS, joints_of, rod_forces
+from ..plants.pmsm_emla import ratings
+from .crane_dynamics import JOINTS, joints_of, rod_forces, strokes
 from .crane_geometry import LIFT, TELESCOPE, TILT, tool
 from .machine import Disturbance, Machine
-from .model import Model, check_numbers, check_parameters, given, no_place, numbers_of
+from .model import Model, Numbers, check_numbers, check_parameters, given, no_place, numbers_of
 
 #: Longest strokes, m.
 STROKES = {"lift": LIFT.stroke, "tilt": TILT.stroke, "telescope": TELESCOPE}
 
 
-def crane(parameters: Mapping[str, Mapping[str, Parameter]], locked: Mapping[str, float] | None = None) -> Machine:
+def crane(
+    parameters: Mapping[str, Mapping[str, Parameter]], locked: Mapping[str, float] | None = None,
+    rated: Mapping[str, Mapping[str, Parameter]] | None = None,
+) -> Machine:  # fmt: skip
     """The machine; its states are those of the EMLAs, 4 a joint.
 
     Args:
         parameters: Replacements for those of `pmsm_emla`, by joint.
         locked: Joints that have no actuator, and the stroke at which they stand still, m.
+        rated: Replacements for the ratings of `pmsm_emla`, by joint.
     """
     fixed = dict(locked or {})
     kept = [k for k, name in enumerate(JOINTS) if name not in fixed]
@@ -33,10 +38,10 @@ def crane(parameters: Mapping[str, Mapping[str, Parameter]], locked: Mapping[str
     massless = {"load_mass": replace(known["load_mass"], value=0.0, tolerance=0.0, source="derived",
                                      meaning="part of the crane's inertia in the axis' own model")}  # fmt: skip
     plants = [
-        pmsm_emla("voltage", {**parameters.get(JOINTS[k], {}), **massless}).with_values(
-            stroke=(0.0, STROKES[JOINTS[k]])
+        pmsm_emla("voltage", {**parameters.get(name, {}), **massless}, (rated or {}).get(name)).with_values(
+            stroke=(0.0, STROKES[name])
         )
-        for k in kept
+        for name in (JOINTS[k] for k in kept)
     ]
     n = len(kept)
     x, v, a, d = ca.SX.sym("x", n), ca.SX.sym("v", n), ca.SX.sym("a", n), ca.SX.sym("d", 1)
@@ -47,11 +52,13 @@ def crane(parameters: Mapping[str, Mapping[str, Parameter]], locked: Mapping[str
 
     forces = rod_forces(whole(x, still=False), whole(v, still=True), whole(a, still=True), d[0])
     place = ca.vertcat(*tool(joints_of(whole(x, still=False))))
+    turned = strokes(whole(x, still=True))
     return Machine(
         name="crane", members=tuple(JOINTS[k] for k in kept), plants=tuple(plants),
         disturbances=(Disturbance(name="payload", unit="kg", course="constant"),),
         forces=ca.Function("forces", [x, v, a, d], [ca.vertcat(*(forces[k] for k in kept))]),
         place=ca.Function("place", [x], [place]), planner="crane", coordinates=("x", "z"),
+        of_joints=ca.Function("strokes", [x], [ca.vertcat(*(turned[k] for k in kept))]),
     )  # fmt: skip
 
 
@@ -74,27 +81,27 @@ def _check(section: Any) -> None:
         if not 0 <= stroke <= STROKES[name]:
             rule = f"is a stroke from 0 to {STROKES[name]:g} m: got {stroke:g}"
             raise RefusedKeyError(f"locked.{name}", rule, "correct it")
-    check_parameters("parameters", section.parameters, known, "an EMLA of the crane")
-    limits = pmsm_emla("voltage").limits
+    blank = pmsm_emla("voltage")
+    others = dict.fromkeys(blank.ratings, "ratings") | {limit.name: "limits" for limit in blank.limits}
+    check_parameters("parameters", section.parameters, known, "an EMLA of the crane", others)
+    check_numbers("", section, blank, stroke=False)
     for name, drive in section.joints.items():
-        check_parameters(f"joints.{name}.parameters", drive.parameters, known, "an EMLA of the crane")
-        check_numbers(f"joints.{name}", drive, limits)
+        check_parameters(f"joints.{name}.parameters", drive.parameters, known, "an EMLA of the crane", others)
+        check_numbers(f"joints.{name}.", drive, blank)
         if drive.least_effectiveness is not None:
             raise RefusedKeyError(f"joints.{name}.least_effectiveness", "has no place at voltage level", "remove it")
 
 
 def _build(section: Any) -> Machine:
-    known, found = defaults("voltage"), {}
-    shared = given(section.parameters, known)
-    for name in JOINTS:
-        own = section.joints.get(name)
-        found[name] = {**shared, **(given(own.parameters, {**known, **shared}) if own is not None else {})}
-    made = crane(found, section.locked)
-    plants = tuple(
-        numbers_of(plant, section.joints.get(name), None)
-        for name, plant in zip(made.members, made.plants, strict=True)
-    )  # fmt: skip
-    return replace(made, plants=plants)
+    numbers = {name: Numbers.of(section, name) for name in JOINTS}
+    parameters = {name: given(own.parameters, defaults("voltage")) for name, own in numbers.items()}
+    rated = {name: given(own.ratings, ratings("voltage")) for name, own in numbers.items()}
+    made = crane(parameters, section.locked, rated)
+    plants = {
+        name: numbers_of(plant, numbers[name]) for name, plant in zip(made.members, made.plants, strict=True)
+    }  # fmt: skip
+    bundled = {name: numbers[name].left(plant, coupled=True) for name, plant in plants.items()}
+    return replace(made, plants=tuple(plants.values()), bundled=bundled)
 
 
 MODEL = Model(members=_members, check=_check, build=_build, kinds=("bspline",))

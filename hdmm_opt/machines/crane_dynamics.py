@@ -21,15 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from ..plants.parameter import Parameter
-from ..plants.pmsm_emla import (
-    MAXIMUM_SPEED,
-    PEAK_CURRENT,
-    PEAK_TORQUE,
-    PHASE_VOLTAGE,
-    POLE_PAIRS,
-    defaults,
-    shaft_torque,
-)
+from ..plants.plant import Plant
+from ..plants.pmsm_emla import defaults, pmsm_emla, shaft_torque, transmission
 from .crane_geometry import BASE, ELBOW, LIFT, TILT, ActuatorLoop
 from .rigid_body import GRAVITY, Payload, inverse_dynamics, pose
 from .urdf import Body, bodies
@@ -210,12 +203,12 @@ def drives(
     speed = lever * v
     gain = lever * a + ca.jtimes(lever, w, v) * v
     torque = ca.vertcat(*(shaft_torque(force[i], speed[i], gain[i], known) for i in range(3)))
-    constant = 1.5 * POLE_PAIRS * known["flux"]
+    constant, r = known["torque_constant"], transmission(known)
     current = torque / constant
     slope = sum((ca.jtimes(current, x, dx) for x, dx in ((w, v), (v, a), (a, j))), ca.SX.zeros(3))
-    turning = speed / known["transmission"]
-    electrical = POLE_PAIRS * turning
-    across = known["resistance"] * current + known["inductance"] * slope + known["flux"] * electrical
+    turning = speed / r
+    electrical = known["pole_pairs"] * turning
+    across = known["resistance"] * current + known["inductance"] * slope + constant * turning / 1.5
     along = -known["inductance"] * electrical * current
     copper = 1.5 * known["resistance"] * current**2
     power = torque * turning + copper
@@ -230,11 +223,18 @@ def drives(
     )
 
 
-#: Largest force, motor speed, torque, current and voltage of an EMLA, with units.
-LIMITS = (
-    ("force", "N", RATED_FORCE),
-    ("motor speed", "rad/s", MAXIMUM_SPEED / defaults("voltage")["transmission"].value),
-    ("motor torque", "N m", PEAK_TORQUE),
-    ("current", "A", PEAK_CURRENT),
-    ("voltage", "V", PHASE_VOLTAGE),
-)
+def drive_limits(plant: Plant | None = None) -> tuple[tuple[str, str, float], ...]:
+    """Largest force, motor speed, torque, current and voltage of an EMLA at voltage level: name, unit, value.
+
+    Args:
+        plant: The EMLA; the bundled one where None.
+    """
+    own = pmsm_emla("voltage") if plant is None else plant
+    limits = {limit.name: limit.value for limit in own.limits}
+    return (
+        ("force", "N", RATED_FORCE),
+        ("motor speed", "rad/s", limits["speed"] / transmission(own.values())),
+        ("motor torque", "N m", own.ratings["peak_torque"].value),
+        ("current", "A", limits["current"]),
+        ("voltage", "V", limits["voltage"]),
+    )

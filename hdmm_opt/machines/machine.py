@@ -8,7 +8,7 @@ reference.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -51,6 +51,8 @@ class Machine:
         planner: How `motions` makes references for it.
         assumed: What has no public source, beside the parameters that say so.
         coordinates: Names of the output's coordinates.
+        of_joints: CasADi function joint coordinates -> the members' first states; None where they are the same.
+        bundled: Numbers of each member that the study leaves to the bundled machine.
     """
 
     name: str
@@ -62,6 +64,8 @@ class Machine:
     planner: str
     assumed: tuple[str, ...] = ()
     coordinates: tuple[str, ...] = ("",)
+    of_joints: Any = None
+    bundled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def own(self) -> tuple[float, ...]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 from ..errors import RefusedKeyError
 from ..names import nearest
-from ..plants import EFFECTIVENESS, Limit, Parameter, Plant, effectiveness
+from ..plants import EFFECTIVENESS, Parameter, Plant, effectiveness
 from .machine import Machine
 
 
@@ -34,46 +35,137 @@ def given(parameters: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict
     return {
         name: replace(
             known[name], value=p.value, unit=p.unit, source=p.source,
-            tolerance=known[name].tolerance if p.tolerance is None else p.tolerance,
+            tolerance=known[name].tolerance if getattr(p, "tolerance", None) is None else p.tolerance,
         )
         for name, p in parameters.items()
     }  # fmt: skip
 
 
-def numbers_of(plant: Plant, section: Any, least: float | None) -> Plant:
+#: Keys of a stroke by the unit of the first state.
+STROKE = {"m": "stroke_m", "rad": "stroke_rad", "m/s": "stroke_m_s", "rad/s": "stroke_rad_s"}
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What a study says of one member: the numbers of all members, and its own over them.
+
+    Attributes:
+        parameters, ratings, limits: Entries of the study by name.
+        stroke: Range of the first state, or None.
+        least: Least effectiveness, or None.
+        bundled: What a gain file says was left to the bundled machine, or None.
+    """
+
+    parameters: Mapping[str, Any]
+    ratings: Mapping[str, Any]
+    limits: Mapping[str, Any]
+    stroke: tuple[float, float] | None
+    least: float | None
+    bundled: tuple[str, ...] | None
+
+    @staticmethod
+    def of(section: Any, member: str) -> Numbers:
+        """The numbers of a member of a `[plant]` section."""
+        own = section.joints.get(member)
+        parts = (section,) if own is None else (section, own)
+        strokes = [getattr(part, key) for part in parts for key in STROKE.values() if getattr(part, key) is not None]
+        return Numbers(
+            *({name: entry for part in parts for name, entry in getattr(part, kind).items()} for kind in KINDS),
+            stroke=strokes[-1] if strokes else None,
+            least=None if own is None else own.least_effectiveness, bundled=None if own is None else own.bundled,
+        )  # fmt: skip
+
+    def left(self, plant: Plant, *, coupled: bool) -> tuple[str, ...]:
+        """Names of the numbers of a plant that the study leaves to the bundled machine."""
+        if self.bundled is not None:
+            return self.bundled
+        unasked = {EFFECTIVENESS, *([plant.carried] if coupled else [])}
+        found = [name for name in plant.parameters if name not in self.parameters and name not in unasked]
+        found += [name for name in plant.ratings if name not in self.ratings]
+        found += [f"{limit.name} limit" for limit in plant.limits if limit.name not in self.limits]
+        return (*found, *(() if self.stroke else ("stroke",)))
+
+
+#: Kinds of numbers that a study gives by name.
+KINDS = ("parameters", "ratings", "limits")
+
+
+def numbers_of(plant: Plant, given: Numbers) -> Plant:
     """A plant with the limits, the stroke and the effectiveness that a study gives."""
     limits = {
-        limit.name: replace(limit, value=section.limits[limit.name].value, source=section.limits[limit.name].source)
-        for limit in plant.limits if section is not None and limit.name in section.limits
+        limit.name: replace(limit, value=given.limits[limit.name].value, source=given.limits[limit.name].source)
+        for limit in plant.limits if limit.name in given.limits
     }  # fmt: skip
-    parameters = {} if least is None else {EFFECTIVENESS: effectiveness(least)}
-    stroke = None if section is None else section.stroke
-    return plant.with_values(parameters=parameters, limits=limits, stroke=stroke)
+    parameters = {} if given.least is None else {EFFECTIVENESS: effectiveness(given.least)}
+    return plant.with_values(parameters=parameters, limits=limits, stroke=given.stroke)
 
 
-def check_parameters(where: str, parameters: Mapping[str, Any], known: Mapping[str, Parameter], what: str) -> None:
-    """Refuse parameters that a plant does not have, in other units, or of the wrong sign."""
+def check_parameters(
+    where: str, parameters: Mapping[str, Any], known: Mapping[str, Parameter], what: str,
+    others: Mapping[str, str] = MappingProxyType({}),
+) -> None:  # fmt: skip
+    """Refuse parameters that a plant does not have, in other units, or of the wrong sign.
+
+    Args:
+        where: Place of the section.
+        parameters: Its entries.
+        known: The parameters of the plant.
+        what: The plant, for messages.
+        others: Names of its other numbers, and the section that each belongs in.
+    """
     for name, p in parameters.items():
         if name not in known or name == EFFECTIVENESS:
+            if name in others:
+                rule, remedy = f"is not a parameter of {what}, but one of its {others[name]}", f"plant.{others[name]}"
+                raise RefusedKeyError(f"{where}.{name}", rule, f"write {remedy}.{name}")
             raise RefusedKeyError(f"{where}.{name}", f"is not a parameter of {what}", nearest(name, known))
         if p.unit != known[name].unit:
             rule = f'must be "{known[name].unit}": got "{p.unit}"'
             raise RefusedKeyError(f"{where}.{name}.unit", rule, "convert the value")
-        if known[name].value > 0 and not p.value > 0:
+        if known[name].loss and not p.value >= 0:
+            raise RefusedKeyError(f"{where}.{name}.value", f"must be 0 or more: got {p.value:g}", "correct the sign")
+        if known[name].value > 0 and not known[name].loss and not p.value > 0:
             raise RefusedKeyError(f"{where}.{name}.value", f"must be positive: got {p.value:g}", "correct the sign")
 
 
-def check_numbers(where: str, section: Any, limits: tuple[Limit, ...]) -> None:
-    """Refuse limits that a plant does not have or in other units, and a stroke without length."""
-    known = {limit.name: limit for limit in limits}
-    for name, entry in section.limits.items():
-        if name not in known:
-            raise RefusedKeyError(f"{where}.limits.{name}", "is not a limit of this plant", nearest(name, known))
-        if entry.unit != known[name].unit:
-            rule = f'must be "{known[name].unit}": got "{entry.unit}"'
-            raise RefusedKeyError(f"{where}.limits.{name}.unit", rule, "convert the value")
-    if section.stroke is not None and not section.stroke[0] < section.stroke[1]:
-        raise RefusedKeyError(f"{where}.stroke", f"needs lower < upper: got {list(section.stroke)}", "correct them")
+def check_numbers(where: str, section: Any, plant: Plant, *, stroke: bool = True) -> None:
+    """Refuse limits and ratings that a plant does not have or in other units, and a stroke without length.
+
+    Args:
+        where: Place of the section, with a dot behind it; empty for `[plant]` itself.
+        section: The section.
+        plant: The plant with any numbers.
+        stroke: Whether the section may give a stroke.
+    """
+    for kind, what, known in (
+        ("limits", "limit", {limit.name: limit.unit for limit in plant.limits}),
+        ("ratings", "rating", {name: p.unit for name, p in plant.ratings.items()}),
+    ):
+        for name, entry in getattr(section, kind).items():
+            if name not in known:
+                elsewhere = _elsewhere(name, plant)
+                rule = f"is not a {what} of this plant" + (f", but one of its {elsewhere}" if elsewhere else "")
+                remedy = f"write plant.{elsewhere}.{name}" if elsewhere else nearest(name, known)
+                raise RefusedKeyError(f"{where}{kind}.{name}", rule, remedy)
+            if entry.unit != known[name]:
+                rule = f'must be "{known[name]}": got "{entry.unit}"'
+                raise RefusedKeyError(f"{where}{kind}.{name}.unit", rule, "convert the value")
+    for unit, key in STROKE.items():
+        given = getattr(section, key)
+        if given is not None and (not stroke or unit != plant.state_units[0]):
+            rule = f"has no place here: the first state of this plant is in {plant.state_units[0]}"
+            remedy = f"give {STROKE[plant.state_units[0]]}" + ("" if stroke else " with its joint")
+            raise RefusedKeyError(f"{where}{key}", rule, remedy)
+        if given is not None and not given[0] < given[1]:
+            raise RefusedKeyError(f"{where}{key}", f"needs lower < upper: got {list(given)}", "correct them")
+
+
+def _elsewhere(name: str, plant: Plant) -> str:
+    """Which kind of number of a plant a name is."""
+    known = {
+        "parameters": plant.parameters, "ratings": plant.ratings, "limits": [limit.name for limit in plant.limits]
+    }  # fmt: skip
+    return next((kind for kind in KINDS if name in known[kind]), "")
 
 
 def no_place(section: Any, keys: tuple[str, ...], name: str) -> None:

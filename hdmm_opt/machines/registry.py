@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..discovery import all_offered, offered
 from ..errors import RefusedKeyError
 from ..names import nearest
+from ..plants.own import own_name, own_plant
 from ..plants.registry import plant_model, plant_names
 from .model import Model
 from .single import single
@@ -19,7 +20,9 @@ def model(name: str) -> Model:
     found = offered(f"{__package__}", name, "MODEL")
     if found is not None:
         return found
-    plant = plant_model(name)
+    plant = own_plant(name) if own_name(name) else plant_model(name)
+    if plant is None and own_name(name):
+        raise RefusedKeyError("model", f"is code of your own: got {name[:60]!r}", "--allow-code runs it")
     if plant is None:
         raise RefusedKeyError("model", f"is unknown: got {name[:40]!r}", nearest(name, model_names()))
     return single(name, plant)

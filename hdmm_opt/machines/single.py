@@ -11,7 +11,7 @@ from ..names import nearest
 from ..plants import EFFECTIVENESS
 from ..plants.registry import PlantModel
 from .machine import Disturbance, Machine
-from .model import Model, check_numbers, check_parameters, given, no_place, numbers_of
+from .model import Model, Numbers, check_numbers, check_parameters, given, no_place, numbers_of
 
 #: Name of the only member.
 MEMBER = "actuator"
@@ -34,25 +34,27 @@ def single(name: str, plant: PlantModel) -> Model:
             if member != MEMBER:
                 raise RefusedKeyError(f"joints.{member}", "is not a member of this machine", nearest(member, [MEMBER]))
         known, own = plant.defaults(section.level), section.joints.get(MEMBER)
-        check_parameters("parameters", section.parameters, known, name)
+        blank = plant.build(section.level, {}, {})
+        others = dict.fromkeys(blank.ratings, "ratings") | {limit.name: "limits" for limit in blank.limits}
+        check_parameters("parameters", section.parameters, known, name, others)
+        check_numbers("", section, blank)
         if own is not None:
-            check_parameters(f"joints.{MEMBER}.parameters", own.parameters, known, name)
-            check_numbers(f"joints.{MEMBER}", own, plant.build(section.level, {}).limits)
+            check_parameters(f"joints.{MEMBER}.parameters", own.parameters, known, name, others)
+            check_numbers(f"joints.{MEMBER}.", own, blank)
             if own.least_effectiveness is not None and EFFECTIVENESS not in known:
                 rule = f'has no place with level = "{section.level}"'
                 raise RefusedKeyError(f"joints.{MEMBER}.least_effectiveness", rule, "remove it")
 
     def build(section: Any) -> Machine:
-        known, own = plant.defaults(section.level), section.joints.get(MEMBER)
-        parameters = given(section.parameters, known)
-        parameters |= given(own.parameters, {**known, **parameters}) if own is not None else {}
-        made = plant.build(section.level, parameters)
-        made = numbers_of(made, own, None if own is None else own.least_effectiveness)
+        numbers = Numbers.of(section, MEMBER)
+        parameters = given(numbers.parameters, plant.defaults(section.level))
+        made = plant.build(section.level, parameters, given(numbers.ratings, plant.ratings(section.level)))
+        made = numbers_of(made, numbers)
         x = ca.SX.sym("x", 1)
         disturbances = tuple(Disturbance(name=w, unit=made.load_unit, course="any") for w in made.disturbances)
         return Machine(
             name=name, members=(MEMBER,), plants=(made,), disturbances=disturbances, forces=None,
-            place=ca.Function("place", [x], [x]), planner="axis",
+            place=ca.Function("place", [x], [x]), planner="axis", bundled={MEMBER: numbers.left(made, coupled=False)},
         )  # fmt: skip
 
     return Model(members=lambda section: (MEMBER,), check=check, build=build, kinds=("quintic", "bspline"))

@@ -32,6 +32,8 @@ def crane_moves(study: Study, machine: Machine) -> list[list[Spline]]:
 
     def whole(place: tuple[float, ...]) -> tuple[float, float, float]:
         given = dict(zip(machine.members, place, strict=True))
+        if section.coordinates == "members":
+            given = {name: _coordinate(name, value) for name, value in given.items()}
         first, second, third = (given[name] if name in given else _coordinate(name, locked[name]) for name in JOINTS)
         return (first, second, third)
 

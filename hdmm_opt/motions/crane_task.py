@@ -13,10 +13,10 @@ from trajectories import Cost, Quantities, Task, Waypoint
 from trajectories.obstacle import Obstacle
 
 from ..errors import InvalidInputError
-from ..machines.crane_dynamics import JOINTS, LIMITS, drives
+from ..machines.crane_dynamics import JOINTS, drive_limits, drives
 from ..machines.crane_geometry import tool
 from ..machines.crane_limits import COSTS, joint_limits
-from ..plants.pmsm_emla import PEAK_TORQUE, defaults
+from ..plants.pmsm_emla import defaults
 from .enclosure import enclosure
 
 #: What a motion of the crane rests on that has no public source.
@@ -46,12 +46,13 @@ def drive_quantities(payload: float = 0.0, obstacles: tuple[Obstacle, ...] = ())
     columns = (found.force, found.speed, found.torque, found.current, found.voltage)
     clear = [obstacle.clearance(tool(w)) for obstacle in obstacles]
     column = ca.Function("drives", symbols, [ca.densify(ca.vertcat(*columns, *clear))])
-    names = [f"{joint} {name}" for name, _, _ in LIMITS for joint in JOINTS]
-    sizes = np.repeat([limit for _, _, limit in LIMITS], len(JOINTS))
+    limits = drive_limits()
+    names = [f"{joint} {name}" for name, _, _ in limits for joint in JOINTS]
+    sizes = np.repeat([limit for _, _, limit in limits], len(JOINTS))
     return Quantities(
         function=column,
         names=(*names, *(f"clearance of {obstacle.name}" for obstacle in obstacles)),
-        units=(*(unit for _, unit, _ in LIMITS for _ in JOINTS), *("m" for _ in obstacles)),
+        units=(*(unit for _, unit, _ in limits for _ in JOINTS), *("m" for _ in obstacles)),
         lower=np.concatenate([-sizes, np.zeros(len(obstacles))]),
         upper=np.concatenate([sizes, np.full(len(obstacles), np.inf)]),
         enclose=enclosure(column),
@@ -63,7 +64,7 @@ def running_costs(payload: float = 0.0) -> ca.Function:
     """Electrical power drawn, W, what is lost of it, W, and effort, the sum of squared shares of the torque limits."""
     w, v, a, j = symbols = [ca.SX.sym(name, 3) for name in "wvaj"]
     found = drives(w, v, a, j, payload)
-    effort = ca.sumsqr(found.torque / PEAK_TORQUE)
+    effort = ca.sumsqr(found.torque / dict((name, value) for name, _, value in drive_limits())["motor torque"])
     return ca.Function("costs", symbols, [ca.vertcat(ca.sum1(found.power), ca.sum1(found.loss), effort)])
 
 

@@ -18,6 +18,7 @@ class Parameter:
         tolerance: Relative half width of the range that the proof covers; constant in time.
         source: One of `SOURCES`. An "assumed" value is a placeholder that the user must replace.
         meaning: One line.
+        loss: Whether it is a loss, which a machine may be without: zero is a value.
         ends: The range itself where it is not symmetric or where its ends are to be met exactly.
     """
 
@@ -26,6 +27,7 @@ class Parameter:
     tolerance: float = 0.0
     source: str = "assumed"
     meaning: str = ""
+    loss: bool = False
     ends: tuple[float, float] | None = None
 
     def at(self, share: float) -> float:

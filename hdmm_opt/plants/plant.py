@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from .parameter import Parameter
@@ -72,7 +72,7 @@ class Plant:
             actuator delivers, "power" what it does mechanically, W.
         load_unit: Unit of the disturbances.
         output_units: Unit of each output.
-        operating: State at which the plant's time constants are read off, for integration steps. Shape (n,).
+        ratings: Numbers that the equations do not read: what a motion asks of the actuator follows from them.
         carried: Name of the parameter that holds the plant's own part of the inertia of bodies that a coupling moves;
             empty for a plant that cannot be a member of a coupling.
         first: Whether the first state is a position or a speed.
@@ -100,11 +100,17 @@ class Plant:
     stroke: tuple[float, float]
     outputs: Mapping[str, Any]
     output_units: Mapping[str, str]
-    operating: tuple[float, ...]
     load_unit: str = "N"
     carried: str = ""
     first: Literal["position", "speed"] = "position"
     efforts: Efforts | None = None
+    ratings: Mapping[str, Parameter] = field(default_factory=dict)
+
+    @property
+    def operating(self) -> tuple[float, ...]:
+        """State at which the time constants are read off: the middle of the stroke, half of each state's own limit."""
+        own = {limit.signals[0]: limit.value / 2 for limit in self.limits if len(limit.signals) == 1}
+        return (sum(self.stroke) / 2, *(own.get(state, 0.0) for state in self.states[1:]))
 
     @property
     def accelerating(self) -> int:
@@ -145,6 +151,26 @@ class Plant:
 
         return ca.substitute([self.force], [self.x, self.u, self.w, self.p], [x, u, w, p])[0]
 
+    def _driver(self, i: int) -> tuple[Any, list[int]]:
+        """What drives a row: the state that tracks its virtual control, or its input; and the rows that follow it."""
+        following = [j for j, target in enumerate(self.targets) if target == i]
+        return (self.x[following[0]] if following else self.u[self.input_map.index(i)]), following
+
+    def inertia_over_gain(self, i: int) -> float:
+        """M_i over the effect of what drives row i, at nominal parameters, at rest in the middle of the stroke."""
+        import casadi as ca
+
+        gain = ca.jacobian(self.force[i], self._driver(i)[0])
+        point = [
+            list(self.operating),
+            [0.0] * len(self.inputs),
+            [0.0] * len(self.disturbances),
+            list(self.values().values()),
+        ]
+        found = ca.Function("ratio", [self.x, self.u, self.w, self.p], [self.mass[i], gain])(*point)
+        mass, effect = (abs(float(value)) for value in found)
+        return mass / effect if effect > 0 else mass
+
     def demand(self, i: int, rate: Any, *, x: Any, w: Any, p: Any) -> Any:
         """The value of what drives a row that gives ``x_i' = rate``, where h_i is affine in it.
 
@@ -159,8 +185,7 @@ class Plant:
         """
         import casadi as ca
 
-        following = [j for j, target in enumerate(self.targets) if target == i]
-        source = self.x[following[0]] if following else self.u[self.input_map.index(i)]
+        source, following = self._driver(i)
         without = ca.vertcat(*(0 if j in following[:1] else x[j] for j in range(len(self.states))))
         symbols, values = [self.x, self.u, self.w, self.p], [without, ca.SX.zeros(len(self.inputs)), w, p]
         gain = ca.jacobian(self.force[i], source)

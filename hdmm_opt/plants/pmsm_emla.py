@@ -1,9 +1,10 @@
 """PMSM-driven electromechanical linear actuator (EMLA): motor, gear, screw, load (publications P-1, P-2, P-4, P-6).
 
-Amplitude-invariant Park frame, L_d = L_q. With transmission r = lead / (2 pi · gear ratio) and motor speed x'/r:
+Amplitude-invariant Park frame, L_d = L_q. With transmission r = screw lead / (2 pi · gear ratio), motor speed x'/r and
+torque constant k = 3/2 · pole pairs · psi:
 
     (J/r + r m) x'' (1 + rho s l) = tau - B x'/r - r (1 + s l)(F_load + F_friction),   rho = r m / (J/r + r m)
-    L i_q' = u_q - R i_q - L w_e i_d - psi w_e,    L i_d' = u_d - R i_d + L w_e i_q,   w_e = pole pairs · x'/r
+    L i_q' = u_q - R i_q - L w_e i_d - 2/3 k x'/r,    L i_d' = u_d - R i_d + L w_e i_q,   w_e = pole pairs · x'/r
 
 The screw and the gear need 1 + s l times the ideal torque: s = +1 where the motor drives the load, -1 where the load
 drives the motor, smoothed over a small power; l = mu / tan(lead angle) + gear loss. With mu = 0.003, 0.005 and 0.01,
@@ -23,22 +24,33 @@ from .parameter import EFFECTIVENESS, Parameter, effectiveness
 from .plant import Efforts, Limit, Plant
 from .registry import PlantModel
 
-_LEAD_ANGLE = math.radians(4.55)
+_FLUX = 0.134 * math.sqrt(2.0)
 
 _MECHANICAL = {
-    "transmission": Parameter(
-        value=0.016 / (2 * math.pi * 7.7), unit="m/rad", source="derived", meaning="screw lead / (2 pi · gear ratio)"
+    "screw_lead": Parameter(value=0.016, unit="m", source="table", meaning="travel of the rod per turn of the screw"),
+    "screw_diameter": Parameter(
+        value=0.064,
+        unit="m",
+        source="derived",
+        meaning="pitch diameter of the screw, for a lead angle of 4.55 deg",
     ),
-    "lead_angle_tangent": Parameter(
-        value=math.tan(_LEAD_ANGLE), unit="1", source="derived", meaning="tangent of the screw's lead angle, 4.55 deg"
-    ),
+    "gear_ratio": Parameter(value=7.7, unit="1", source="table", meaning="turns of the motor per turn of the screw"),
     "screw_friction": Parameter(
-        value=0.0065, unit="1", tolerance=0.54, source="table", meaning="friction coefficient of the screw, 0.003-0.01"
+        loss=True,
+        value=0.0065,
+        unit="1",
+        tolerance=0.54,
+        source="table",
+        meaning="friction coefficient of the screw, 0.003-0.01",
     ),
-    "gear_loss": Parameter(value=0.02, unit="1", tolerance=0.5, meaning="share of torque lost in the gear"),
+    "gear_loss": Parameter(loss=True, value=0.02, unit="1", tolerance=0.5, meaning="share of torque lost in the gear"),
     "motor_inertia": Parameter(value=0.012, unit="kg m^2", tolerance=0.1, meaning="rotor, gear and screw inertia"),
-    "viscous_friction": Parameter(value=0.01, unit="N m s/rad", tolerance=0.3, meaning="viscous friction at the motor"),
-    "coulomb_friction": Parameter(value=300.0, unit="N", tolerance=0.5, meaning="Coulomb friction of the rod"),
+    "viscous_friction": Parameter(
+        loss=True, value=0.01, unit="N m s/rad", tolerance=0.3, meaning="viscous friction at the motor"
+    ),
+    "coulomb_friction": Parameter(
+        loss=True, value=300.0, unit="N", tolerance=0.5, meaning="Coulomb friction of the rod"
+    ),
     "friction_speed": Parameter(value=0.002, unit="m/s", meaning="speed over which Coulomb friction builds up"),
     "power_scale": Parameter(value=100.0, unit="W", meaning="power over which the screw's loss changes direction"),
     "load_mass": Parameter(value=2000.0, unit="kg", tolerance=0.2, meaning="mass that moves with the rod"),
@@ -48,24 +60,28 @@ _TORQUE = {
     "drive_lag": Parameter(value=0.0003, unit="s", tolerance=0.2, meaning="time constant of the drive's current loop"),
     EFFECTIVENESS: effectiveness(1.0),
 }
-_VOLTAGE = {
-    "flux": Parameter(
-        value=0.134 * math.sqrt(2.0), unit="Wb", tolerance=0.03, source="derived", meaning="flux, amplitude"
+_MOTOR = {
+    "pole_pairs": Parameter(value=4.0, unit="1", source="table", meaning="pole pairs of the motor"),
+    "torque_constant": Parameter(
+        value=6 * _FLUX, unit="N m/A", tolerance=0.03, source="derived",
+        meaning="torque per ampere of amplitude; per ampere RMS it is sqrt(2) times as large",
     ),
     "resistance": Parameter(value=0.08, unit="ohm", tolerance=0.2, source="table", meaning="phase resistance"),
     "inductance": Parameter(value=0.00242, unit="H", tolerance=0.05, source="table", meaning="phase inductance"),
+}  # fmt: skip
+_PEAK = {"peak_torque": Parameter(value=77.0, unit="N m", source="table", meaning="largest torque of the motor")}
+#: Peaks of the bundled motor, for limits that a study does not give.
+_SPEED = 3877.0 / 60.0 * 0.016 / 7.7
+_LIMITS = {
+    "torque": Limit(name="torque", signals=("torque_command",), value=77.0, unit="N m", source="table"),
+    "voltage": Limit(
+        name="voltage", signals=("u_q", "u_d"), value=380.0 * math.sqrt(2.0 / 3.0), unit="V", source="derived"
+    ),
+    "current": Limit(name="current", signals=("i_q", "i_d"), value=48.2 * math.sqrt(2.0), unit="A", source="derived"),
+    "speed": Limit(name="speed", signals=("speed",), value=_SPEED, unit="m/s", source="derived"),
 }
-POLE_PAIRS = 4
-TORQUE_CONSTANT = 1.5 * POLE_PAIRS * 0.134 * math.sqrt(2.0)
-PEAK_CURRENT = 48.2 * math.sqrt(2.0)
-RATED_CURRENT = 23.1 * math.sqrt(2.0)
-PEAK_TORQUE = 77.0
-PHASE_VOLTAGE = 380.0 * math.sqrt(2.0 / 3.0)
-MAXIMUM_SPEED = 3877.0 / 60.0 * 0.016 / 7.7
-STROKE = (0.0, 0.6)
+_STROKE = (0.0, 0.6)
 
-#: Half the stroke at half the largest speed.
-_OPERATING = (sum(STROKE) / 2, MAXIMUM_SPEED / 2)
 _OUTPUT_UNITS = {"torque": "N m", "current": "A", "power": "W"}
 
 LEVELS = ("torque", "voltage")
@@ -79,15 +95,37 @@ def defaults(level: str) -> dict[str, Parameter]:
     """
     if level not in LEVELS:
         raise ValueError(f'plant.level is "torque" or "voltage": got "{level}"')
-    return {**_MECHANICAL, **(_TORQUE if level == "torque" else _VOLTAGE)}
+    return {**_MECHANICAL, **(_TORQUE if level == "torque" else _MOTOR)}
 
 
-def pmsm_emla(level: str, parameters: Mapping[str, Parameter] | None = None) -> Plant:
+def ratings(level: str) -> dict[str, Parameter]:
+    """Numbers of the motor that the equations of a level do not read; its currents and voltages follow from them."""
+    return dict(_MOTOR) if level == "torque" else dict(_PEAK)
+
+
+def transmission(values: Mapping[str, Any]) -> Any:
+    """Travel of the rod per radian of the motor, m/rad.
+
+    Args:
+        values: Values of the parameters by name.
+    """
+    return values["screw_lead"] / (2 * math.pi * values["gear_ratio"])
+
+
+def lead_angle_tangent(values: Mapping[str, Any]) -> Any:
+    """Tangent of the screw's lead angle."""
+    return values["screw_lead"] / (math.pi * values["screw_diameter"])
+
+
+def pmsm_emla(
+    level: str, parameters: Mapping[str, Parameter] | None = None, rated: Mapping[str, Parameter] | None = None
+) -> Plant:
     """Build the symbolic model.
 
     Args:
         level: "torque" (u in N m, drive with its own current loop) or "voltage" (u_q, u_d in V).
         parameters: Replacements for `defaults(level)`.
+        rated: Replacements for `ratings(level)`.
 
     Returns:
         The plant. Torque level: states position, speed, torque. Voltage level: position, speed, i_q, i_d, of which
@@ -98,19 +136,19 @@ def pmsm_emla(level: str, parameters: Mapping[str, Parameter] | None = None) -> 
 
     Not guaranteed: backlash, screw and gear compliance, cogging, saturation and thermal effects are not modelled.
     """
-    known = {**defaults(level), **(parameters or {})}
-    return _torque_level(known) if level == "torque" else _voltage_level(known)
+    known, motor = {**defaults(level), **(parameters or {})}, {**ratings(level), **(rated or {})}
+    return _torque_level(known, motor) if level == "torque" else _voltage_level(known, motor)
 
 
 def _mechanics(v: Any, torque: Any, load: Any, q: Mapping[str, Any]) -> tuple[Any, Any]:
     """M_2 and h_2."""
     import casadi as ca
 
-    r = q["transmission"]
+    r = transmission(q)
     mass = q["motor_inertia"] / r + r * q["load_mass"]
     force = load + q["coulomb_friction"] * ca.tanh(v / q["friction_speed"])
     direction = ca.tanh(force * v / q["power_scale"])
-    loss = direction * (q["screw_friction"] / q["lead_angle_tangent"] + q["gear_loss"])
+    loss = direction * (q["screw_friction"] / lead_angle_tangent(q) + q["gear_loss"])
     driving = torque - q["viscous_friction"] * (v / r) - r * force - r * (loss * force)
     # what is lost stands apart, so that in a proof the rest cancels against the law term by term
     slowed = loss * (r * q["load_mass"] / mass)
@@ -139,8 +177,8 @@ def steady_power(force: Any, speed: Any, values: Mapping[str, Any]) -> Any:
         values: Values of the parameters of the voltage level by name.
     """
     torque = shaft_torque(force, speed, 0.0, values)
-    current = torque / (1.5 * POLE_PAIRS * values["flux"])
-    return torque * (speed / values["transmission"]) + 1.5 * values["resistance"] * current**2
+    current = torque / values["torque_constant"]
+    return torque * (speed / transmission(values)) + 1.5 * values["resistance"] * current**2
 
 
 def _symbols(states: int, inputs: int, known: Mapping[str, Parameter]) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
@@ -151,10 +189,7 @@ def _symbols(states: int, inputs: int, known: Mapping[str, Parameter]) -> tuple[
     return x, u, w, p, {name: p[k] for k, name in enumerate(known)}
 
 
-_SPEED_LIMIT = Limit(name="speed", signals=("speed",), value=MAXIMUM_SPEED, unit="m/s", source="derived")
-
-
-def _torque_level(known: Mapping[str, Parameter]) -> Plant:
+def _torque_level(known: Mapping[str, Parameter], motor: Mapping[str, Parameter]) -> Plant:
     import casadi as ca
 
     x, u, w, p, q = _symbols(3, 1, known)
@@ -176,24 +211,24 @@ def _torque_level(known: Mapping[str, Parameter]) -> Plant:
         x=x, u=u, w=w, p=p,
         mass=ca.vertcat(1, mass, q["drive_lag"]),
         force=ca.vertcat(x[1], force, q[EFFECTIVENESS] * u[0] - x[2]),
-        limits=(
-            Limit(name="torque", signals=("torque_command",), value=PEAK_TORQUE, unit="N m", source="table"),
-            _SPEED_LIMIT,
-        ),
-        stroke=STROKE,
+        limits=(_LIMITS["torque"], _LIMITS["speed"]),
+        stroke=_STROKE,
+        ratings=motor,
         outputs={
-            "torque": torque, "current": ca.fabs(torque) / TORQUE_CONSTANT, "power": torque * x[1] / q["transmission"]
+            "torque": torque, "current": ca.fabs(torque) / motor["torque_constant"].value,
+            "power": torque * x[1] / transmission(q),
         },
-        output_units=_OUTPUT_UNITS, operating=(*_OPERATING, 0.0), carried="load_mass",
+        output_units=_OUTPUT_UNITS, carried="load_mass",
     )  # fmt: skip
 
 
-def _voltage_level(known: Mapping[str, Parameter]) -> Plant:
+def _voltage_level(known: Mapping[str, Parameter], motor: Mapping[str, Parameter]) -> Plant:
     import casadi as ca
 
     x, u, w, p, q = _symbols(4, 2, known)
-    electrical_speed = POLE_PAIRS * (x[1] / q["transmission"])
-    torque = 1.5 * POLE_PAIRS * q["flux"] * x[2]
+    turning = x[1] / transmission(q)
+    electrical_speed = q["pole_pairs"] * turning
+    torque = q["torque_constant"] * x[2]
     mass, force = _mechanics(x[1], torque, w[0], q)
     resistance, inductance = q["resistance"], q["inductance"]
     return Plant(
@@ -214,17 +249,14 @@ def _voltage_level(known: Mapping[str, Parameter]) -> Plant:
         force=ca.vertcat(
             x[1],
             force,
-            u[0] - resistance * x[2] - inductance * (electrical_speed * x[3]) - q["flux"] * electrical_speed,
+            u[0] - resistance * x[2] - inductance * (electrical_speed * x[3]) - q["torque_constant"] * turning / 1.5,
             u[1] - resistance * x[3] + inductance * (electrical_speed * x[2]),
         ),
-        limits=(
-            Limit(name="voltage", signals=("u_q", "u_d"), value=PHASE_VOLTAGE, unit="V", source="derived"),
-            Limit(name="current", signals=("i_q", "i_d"), value=PEAK_CURRENT, unit="A", source="derived"),
-            _SPEED_LIMIT,
-        ),
-        stroke=STROKE,
-        outputs={"torque": torque, "current": ca.norm_2(x[2:4]), "power": torque * x[1] / q["transmission"]},
-        output_units=_OUTPUT_UNITS, operating=(*_OPERATING, 0.0, 0.0), carried="load_mass",
+        limits=(_LIMITS["voltage"], _LIMITS["current"], _LIMITS["speed"]),
+        stroke=_STROKE,
+        ratings=motor,
+        outputs={"torque": torque, "current": ca.norm_2(x[2:4]), "power": torque * turning},
+        output_units=_OUTPUT_UNITS, carried="load_mass",
     )  # fmt: skip
 
 
@@ -232,7 +264,7 @@ def effort(plant: Plant, loads: Sequence[float]) -> tuple[Any, Any]:
     """What a motion asks of the motor at nominal parameters and a constant load.
 
     Args:
-        plant: An EMLA at either level; electrical parameters that it lacks take their default values.
+        plant: An EMLA at either level.
         loads: Load on the rod, N. Shape (1,).
 
     Returns:
@@ -241,21 +273,20 @@ def effort(plant: Plant, loads: Sequence[float]) -> tuple[Any, Any]:
     """
     import casadi as ca
 
-    known = {**_VOLTAGE, **plant.parameters}
+    known = {name: p.value for name, p in {**plant.ratings, **plant.parameters}.items()}
     x, v, a, j = (ca.SX.sym(name) for name in ("x", "v", "a", "j"))
     values = ca.SX([p.value for p in plant.parameters.values()])
     state = ca.vertcat(x, v, *[0] * (len(plant.states) - 2))
     demand = plant.demand(1, a, x=state, w=ca.SX(list(loads)), p=values)
-    constant = 1.5 * POLE_PAIRS * known["flux"].value
+    constant, r = known["torque_constant"], transmission(known)
     current = demand / constant if plant.level == "torque" else demand
     torque = current * constant
-    inertia = known["motor_inertia"].value / known["transmission"].value
-    inertia += known["transmission"].value * known["load_mass"].value
-    resistance, inductance = known["resistance"].value, known["inductance"].value
-    speed = POLE_PAIRS * v / known["transmission"].value
-    u_q = resistance * current + inductance * (inertia / constant) * j + known["flux"].value * speed
+    inertia = known["motor_inertia"] / r + r * known["load_mass"]
+    resistance, inductance = known["resistance"], known["inductance"]
+    speed = known["pole_pairs"] * v / r
+    u_q = resistance * current + inductance * (inertia / constant) * j + constant * (v / r) / 1.5
     u_d = -inductance * speed * current
-    power = torque * v / known["transmission"].value + 1.5 * resistance * current**2
+    power = torque * v / r + 1.5 * resistance * current**2
     column = ca.vertcat(torque, -torque, current, -current, ca.sqrt(u_q**2 + u_d**2 + 1e-12))
     return ca.Function("effort", [x, v, a, j], [column]), ca.Function("power", [x, v, a, j], [power])
 
@@ -266,4 +297,4 @@ EFFORTS = Efforts(
     limits=("torque_nm", "torque_nm", "current_a", "current_a", "voltage_v"), of=effort,
 )  # fmt: skip
 
-PLANT = PlantModel(levels=LEVELS, defaults=defaults, build=pmsm_emla)
+PLANT = PlantModel(levels=LEVELS, defaults=defaults, build=pmsm_emla, ratings=ratings)

@@ -17,12 +17,14 @@ class PlantModel:
     Attributes:
         levels: Input levels that a study chooses from.
         defaults: Level -> parameters with units, tolerances and sources.
-        build: (level, parameters) -> the plant.
+        build: (level, parameters, ratings) -> the plant.
+        ratings: Level -> numbers that its equations do not read.
     """
 
     levels: tuple[str, ...]
     defaults: Callable[[str], dict[str, Parameter]]
-    build: Callable[[str, Mapping[str, Parameter]], Plant]
+    build: Callable[[str, Mapping[str, Parameter], Mapping[str, Parameter]], Plant]
+    ratings: Callable[[str], dict[str, Parameter]] = lambda level: {}
 
 
 def plant_model(name: str) -> PlantModel | None:

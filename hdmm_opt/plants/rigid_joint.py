@@ -49,7 +49,7 @@ def rigid_joint(
         force=ca.vertcat(x[1], value["effectiveness"] * u - value["damping"] * x[1] - w),
         limits=(torque, Limit(name="speed", signals=("speed",), value=speed, unit=f"{position}/s", source="assumed")),
         stroke=travel, outputs={"torque": value["effectiveness"] * u, "power": value["effectiveness"] * u * x[1]},
-        output_units={"torque": effort, "power": "W"}, operating=(sum(travel) / 2, speed / 2), load_unit=effort,
+        output_units={"torque": effort, "power": "W"}, load_unit=effort,
         carried="load_inertia",
     )  # fmt: skip
 

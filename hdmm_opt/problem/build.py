@@ -55,7 +55,10 @@ def assemble(study: Study, references: tuple[Reference, ...] | None = None) -> P
     laws = {m: law_for(study.controller.law, p, study.controller.modelling)
             for m, p in zip(machine.members, machine.plants, strict=True)}  # fmt: skip
     given = {m: _gains_of(study, m) for m in machine.members}
-    ranges = {m: gain_ranges(laws[m].schema, *given[m]) for m in machine.members}
+    ranges = {
+        m: gain_ranges(laws[m].schema, *given[m], laws[m].derived(study.controller.rate_of(m), initial[m]))
+        for m in machine.members
+    }
     references = made_references(study, machine) if references is None else references
     slices = sliced(references)
     spans = {name: Interval(*d.range) for name, d in study.uncertainty.disturbances.items()}
@@ -92,6 +95,11 @@ def _check_disturbances(study: Study, machine: Machine) -> None:
         if name not in given:
             raise InvalidInputError(f'"uncertainty.disturbances.{name}" is required and missing; give its range')
         low, high = given[name].range
+        if given[name].unit not in (None, disturbance.unit):
+            raise InvalidInputError(
+                f'uncertainty.disturbances.{name}.unit must be "{disturbance.unit}": got "{given[name].unit}"; '
+                "convert the range"
+            )
         if machine.forces is None and low == high:
             raise InvalidInputError(
                 f"uncertainty.disturbances.{name} is an empty range: got [{low:g}, {high:g}]; widen it"

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from ..machines.model import STROKE
 from ..plants import EFFECTIVENESS, Plant
 from .problem import Problem
 
@@ -13,10 +16,14 @@ def resolved(problem: Problem) -> dict[str, Any]:
     study = problem.study
     data = study.model_dump(mode="json", exclude_none=True)
     plant = data["plant"]
-    plant["parameters"] = {}
+    for key in ("parameters", "ratings", "limits"):
+        plant[key] = {}
+    for key in STROKE.values():
+        plant.pop(key, None)
     plant.pop("damping", None)  # it is a parameter of every joint
     several = {member.name: member for member in problem.members}
-    plant["joints"] = {name: _numbers(member.plant, problem) for name, member in several.items()}
+    plant["joints"] = {name: _numbers(name, member.plant, problem) for name, member in several.items()}
+    data["reference"] |= {"coordinates": "members", "waypoints": _waypoints(problem)}
     controller = data["controller"]
     controller["gains"] = {}
     controller["members"] = {
@@ -31,11 +38,19 @@ def resolved(problem: Problem) -> dict[str, Any]:
             for state, value in zip(member.plant.states, getattr(member.bounds, kind), strict=True)
         }
     for disturbance in problem.machine.disturbances:
-        uncertainty["disturbances"][disturbance.name]["course"] = disturbance.course
+        uncertainty["disturbances"][disturbance.name] |= {"course": disturbance.course, "unit": disturbance.unit}
     return data
 
 
-def _numbers(plant: Plant, problem: Problem) -> dict[str, Any]:
+def _waypoints(problem: Problem) -> list[list[float]]:
+    """The waypoints in coordinates of the members: where their references rest."""
+    section = problem.study.reference
+    if section.coordinates == "members" or problem.machine.of_joints is None:
+        return [list(place) for place in section.waypoints]
+    return [[float(v) for v in np.array(problem.machine.of_joints(place)).ravel()] for place in section.waypoints]
+
+
+def _numbers(name: str, plant: Plant, problem: Problem) -> dict[str, Any]:
     """Parameters, limits, stroke and effectiveness of a plant, as a study gives them.
 
     What a coupling makes the plant carry follows from the reference, and is not a number of the study.
@@ -49,8 +64,14 @@ def _numbers(plant: Plant, problem: Problem) -> dict[str, Any]:
         "limits": {
             limit.name: {"value": limit.value, "unit": limit.unit, "source": limit.source} for limit in plant.limits
         },
-        "stroke": list(plant.stroke),
+        STROKE[plant.state_units[0]]: list(plant.stroke),
     }  # fmt: skip
+    if plant.ratings:
+        data["ratings"] = {
+            name: {"value": p.value, "unit": p.unit, "source": p.source} for name, p in plant.ratings.items()
+        }
+    if problem.machine.bundled.get(name):
+        data["bundled"] = list(problem.machine.bundled[name])
     if EFFECTIVENESS in plant.parameters:
         ends = plant.parameters[EFFECTIVENESS].ends
         data["least_effectiveness"] = ends[0] if ends else 1.0

@@ -56,7 +56,7 @@ class Loop:
         self.period = problem.period
         self.parts = parts_of(problem, laws or [member.law for member in problem.members], self.period)
         study = problem.study
-        self.settings = Settings(transient=study.validation.transient_s, band=study.requirements.tracking_error_m)
+        self.settings = Settings(transient=study.validation.transient_s, band=study.requirements.band)
         self.batches = Batches(problem, self.parts, self.period)
         self._engines: dict[Any, Engine] = {}
         self._finer: Loop | None = None

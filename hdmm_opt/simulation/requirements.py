@@ -20,6 +20,7 @@ def required(problem: Problem) -> dict[str, float]:
     """The study's requirements by name; those of an output or an input that no member has are left out."""
     given = problem.study.requirements.model_dump(exclude_none=True)
     errors = given.pop("member_error")
+    given.pop("settling_band_m", None)
     found = {name: limit for name, limit in given.items() if name in OUTPUT or _holders(problem, name)}
     if len(problem.members) > 1:
         found |= {f"member_error.{name}": limit for name, limit in errors.items()}

@@ -12,16 +12,29 @@ from .messages import refused
 from .sections import LimitSection, Name, NonNegative, Pair, ParameterSection, Section
 
 
-class DriveSection(Section):
-    """The numbers of one member: parameters and limits by name, stroke, and how weak its actuator may become."""
+class NumberSection(Section):
+    """Numbers of an actuator by name; and the range of its first state, the unit in the key."""
 
     parameters: dict[str, ParameterSection] = Field(default_factory=dict)
+    ratings: dict[str, LimitSection] = Field(default_factory=dict)
     limits: dict[str, LimitSection] = Field(default_factory=dict)
-    stroke: Pair | None = None
+    stroke_m: Pair | None = None
+    stroke_rad: Pair | None = None
+    stroke_m_s: Pair | None = None
+    stroke_rad_s: Pair | None = None
+
+
+class DriveSection(NumberSection):
+    """The numbers of one member, and how weak its actuator may become.
+
+    `bundled` names what a study left to the bundled machine; a gain file says so.
+    """
+
     least_effectiveness: Annotated[float, Field(ge=0, le=1)] | None = None
+    bundled: tuple[str, ...] | None = None
 
 
-class PlantSection(Section):
+class PlantSection(NumberSection):
     """The machine by name, and its numbers where they are not the bundled ones."""
 
     model: str
@@ -30,7 +43,6 @@ class PlantSection(Section):
     tip_m: tuple[float, float, float] | None = None
     damping: NonNegative | None = None
     least_lever_m_rad: Annotated[float, Field(gt=0, le=0.25)] | None = None
-    parameters: dict[str, ParameterSection] = Field(default_factory=dict)
     joints: dict[Name, DriveSection] = Field(default_factory=dict)
     locked: dict[Name, float] = Field(default_factory=dict)
 
@@ -48,6 +60,7 @@ class DisturbanceSection(Section):
 
     range: Pair
     course: Literal["constant", "any"] | None = None
+    unit: str | None = None
 
     @model_validator(mode="after")
     def _ordered(self) -> DisturbanceSection:

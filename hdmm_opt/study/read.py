@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from ..errors import InvalidInputError
 from ..names import nearest
+from ..plants.own import allow, own_name
 from .messages import one_line
 from .motion import MotionStudy
 from .sections import LARGEST
@@ -27,11 +28,12 @@ def bundled() -> list[str]:
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
-def load(name: str) -> Study:
+def load(name: str, *, allow_code: bool = False) -> Study:
     """Read a study of a design.
 
     Args:
         name: Name of a bundled study, or path of a TOML file.
+        allow_code: Whether `plant.model = "FILE.py:FUNCTION"` may run that file.
 
     Returns:
         The validated study.
@@ -39,7 +41,7 @@ def load(name: str) -> Study:
     Raises:
         InvalidInputError: one line with the rule, what came, and what would do.
     """
-    found = load_any(name)
+    found = load_any(name, allow_code=allow_code)
     if not isinstance(found, Study):
         raise InvalidInputError(
             f'{name}: a design needs a controller: this study is of a motion alone; use "hdmm-opt trajectory {name}"'
@@ -47,7 +49,7 @@ def load(name: str) -> Study:
     return found
 
 
-def load_any(name: str) -> Study | MotionStudy:
+def load_any(name: str, *, allow_code: bool = False) -> Study | MotionStudy:
     """Read a study of a design, or of a motion alone; as `load`."""
     if name in bundled():
         return parse((resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8"), name)
@@ -57,14 +59,15 @@ def load_any(name: str) -> Study | MotionStudy:
             f'no bundled study is named "{name}"; {nearest(name, bundled())} (or give a .toml path)'
         )
     try:
-        return parse(path.read_text(encoding="utf-8"), str(path))
+        text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
         raise InvalidInputError(f"{path}: cannot read the study file: {reason}; check the path") from None
+    return parse(text, str(path), allow_code=allow_code, folder=path.parent)
 
 
-def parse(text: str, where: str) -> Study | MotionStudy:
-    """Read a study from TOML text; `where` names it in errors."""
+def parse(text: str, where: str, *, allow_code: bool = False, folder: Path = Path()) -> Study | MotionStudy:
+    """Read a study from TOML text; `where` names it in errors, `folder` holds the code that it may name."""
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -73,6 +76,17 @@ def parse(text: str, where: str) -> Study | MotionStudy:
         raise InvalidInputError(
             f"{where}: not a study: a number has too many digits, or lists are nested too deeply; correct it"
         ) from None
+    plant = data.get("plant")
+    own = plant.get("model") if isinstance(plant, dict) else None
+    if isinstance(own, str) and own_name(own):
+        if not allow_code:
+            raise InvalidInputError(
+                f'{where}: plant.model = "{own[:80]}" would run that file; add --allow-code if you trust it'
+            )
+        try:
+            allow(own, folder)
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{where}: {error}") from None
     motion = "controller" not in data and isinstance(data.get("reference"), dict) and "moves" in data["reference"]
     return _validated(data, where, MotionStudy) if motion else validated(data, where)
 

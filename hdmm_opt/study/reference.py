@@ -23,10 +23,14 @@ class MotionLimitSection(Section):
 
 
 class ReferenceSection(Section):
-    """Rest-to-rest moves of all members through waypoints, with a dwell before, between and after."""
+    """Rest-to-rest moves of all members through waypoints, with a dwell before, between and after.
+
+    `coordinates` says whose the waypoints are: of the joints of a machine, or of its members, as gain files have them.
+    """
 
     kind: Literal["quintic", "bspline"]
     waypoints: Annotated[Places, Field(min_length=2, max_length=50)]
+    coordinates: Literal["joints", "members"] = "joints"
     durations_s: Annotated[tuple[Positive, ...], Field(max_length=49)] = ()
     dwell_s: NonNegative = 0.5
     objective: Literal["time", "energy"] = "time"

@@ -19,17 +19,24 @@ class RequirementSection(Section):
     """What the design must meet in every run inside the assumptions.
 
     `tracking_error_m` is that of the output: the tool of a machine, the rod of one actuator. `member_error` is that of
-    each member in its unit; the efforts hold for every member that has them.
+    each member in its unit; the efforts hold for every member that has them. The output has settled when it stays
+    inside `settling_band_m`, which is `tracking_error_m` where it is not given.
     """
 
     tracking_error_m: Positive
     member_error: dict[Name, Positive] = Field(default_factory=dict)
     settling_time_s: Positive | None = None
+    settling_band_m: Positive | None = None
     peak_torque_nm: Positive | None = None
     rms_torque_nm: Positive | None = None
     peak_current_a: Positive | None = None
     rms_current_a: Positive | None = None
     peak_voltage_v: Positive | None = None
+
+    @property
+    def band(self) -> float:
+        """The band in which the output has settled, m."""
+        return self.tracking_error_m if self.settling_band_m is None else self.settling_band_m
 
 
 class FaultSection(Section):

@@ -129,8 +129,13 @@ def tanh_point(x: Fraction) -> Interval:
     return down(1 - 2 / (low + 1)), up(1 - 2 / (high + 1))
 
 
+#: What a tanh costs, in products.
+TANH_WORK = 100
+
+
 def tanh(a: Interval) -> Interval:
     """Range of tanh."""
+    WORK.one(TANH_WORK)
     return tanh_point(a[0])[0], tanh_point(a[1])[1]
 
 

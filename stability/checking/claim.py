@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from .arithmetic import Interval
-from .limits import MAX_CELL_DIGITS, VECTORS, need
+from .limits import VECTORS, need
 from .parsing import numbers
 
 
@@ -91,6 +91,4 @@ def cell_of(entry: dict[str, Any], count: int) -> Cell:
     need(isinstance(rows, list) and len(rows) == count, f"a transform must have {count} rows")
     vectors = [numbers(entry[name], count, name) for name in VECTORS["sampled"]]
     transform = [numbers(row, count, "a transform") for row in rows]
-    longest = max(len(str(v)) for row in (*transform, *vectors) for v in row)
-    need(longest <= MAX_CELL_DIGITS, f"a cell's numbers have at most {MAX_CELL_DIGITS} digits")
     return Cell(transform, *vectors)

@@ -5,32 +5,40 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import textwrap
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from .arithmetic import WORK
 from .coupling import Coupling, guarantees_kept
 from .limits import (
-    COUPLED,
     MAX_BYTES,
     MAX_COUPLED,
     MAX_MEMBERS,
+    MAX_PRODUCTS,
     NAME,
-    OBSERVED,
     SCHEMA,
     NotProvedError,
     UnreadableError,
     need,
 )
-from .member import Member, check_member, missing
-from .obligation import Obligation, Report
-from .obligations import milli
+from .member import Member, check_member
+from .obligation import Obligation, Report, downward, milli, percent
 from .observer import observed
 from .parsing import check_digests, number, parse, wrong_schema
+from .shape import shaped
+from .statement import met
 
 
-def check_text(text: str, file: str = "") -> Report:
+def check_text(text: str, file: str = "", *, recorded: bool = True) -> Report:
     """Re-prove a gain file given as text.
+
+    Args:
+        text: The file.
+        file: Its name, for the report.
+        recorded: Whether what the file records of the obligations must be what is found.
 
     Returns:
         Status 0 proved, 1 not proved, 2 unreadable; with one line and the obligations.
@@ -38,14 +46,33 @@ def check_text(text: str, file: str = "") -> Report:
     try:
         data = parse(text)
         need(data.get("schema") == SCHEMA, wrong_schema(data.get("schema")))
+        shaped(data)
         check_digests(text)
-        return check_machine(data, file)
+        report = check_machine(data, file)
+        differs = remembered(data, report) if recorded and not report.status else ""
+        return replace(report, status=1, message=f"not proved: {differs}") if differs else report
     except UnreadableError as error:
         return Report(file, 2, f"unreadable: {error}")
     except NotProvedError as error:
         return Report(file, 1, f"not proved: {error}")
-    except (KeyError, TypeError, AttributeError, IndexError, ValueError, ZeroDivisionError, OverflowError) as error:
+    except RecursionError:
+        return Report(file, 2, "unreadable: the file is nested too deeply")
+    except (KeyError, TypeError, AttributeError, IndexError, ValueError, ArithmeticError) as error:
         return Report(file, 2, f"unreadable: a part of the gain file is missing or malformed: {error!r:.120}")
+
+
+def remembered(data: dict[str, Any], report: Report) -> str:
+    """What the file records otherwise than it is found; empty where nothing."""
+    told = data["obligations"]
+    for found, row in zip(report.obligations, told, strict=False):
+        for key in ("name", "member", "statement", "unit", "verdict"):
+            if row.get(key) != getattr(found, key):
+                return f"the file records another {key} of {found.name}"
+        if not isinstance(row.get("margin"), Fraction) or float(row["margin"]) != found.margin:
+            return f"the file records another margin of {found.name}"
+    if len(told) < len(report.obligations):
+        return f"the file leaves out the obligation {report.obligations[len(told)].name}"
+    return "" if len(told) == len(report.obligations) else "the file records an obligation that there is not"
 
 
 def check_machine(data: dict[str, Any], file: str) -> Report:
@@ -69,9 +96,10 @@ def check_machine(data: dict[str, Any], file: str) -> Report:
     need(all(entry["members"] == names for entry in couplings), "a coupling is of all members in their order")
     need(len(names) == 1 or bool(couplings), "members without a coupling are files of their own")
     made: list[Obligation] = []
+    WORK.begin(MAX_PRODUCTS)
     members = []
-    for entry in data["members"]:
-        member = check_member(data, entry, bool(couplings))
+    for which in range(len(names)):
+        member = check_member(data, which, bool(couplings))
         made += member.made
         if member.failed:
             where = f"{member.name}: " if len(names) > 1 else ""
@@ -84,73 +112,125 @@ def check_together(data: dict[str, Any], members: list[Member], made: list[Oblig
     """What joins the members: guarantees, coupling, observers; and the bound on the output."""
     WORK.begin(MAX_COUPLED)
     observing = data["study"]["controller"].get("observer") is not None
-    required = [*(COUPLED if data["couplings"] else ()), *(OBSERVED if observing else ())]
-    if required:
+    if data["couplings"] or observing:
         made.append(guarantees_kept(data, members))
     coupling = Coupling(data, data["couplings"][0], members) if data["couplings"] else None
     made += coupling.obligations() if coupling is not None else []
     made += [observed(data, members)] if observing else []
-    failed = missing(data, dict.fromkeys(required), "")
     wrong = [o for o in made if o.verdict != "proved"]
-    if failed or wrong:
-        return Report(
-            file, 1, f"not proved: {failed or f'{wrong[0].name} (margin {wrong[0].margin:.4g} {wrong[0].unit})'}", made
-        )
-    settled = float(members[0].claim.transient)
-    if coupling is None:
-        claim = members[0].claim
-        bound = milli(claim.ultimate[0], str(claim.rows[0]["unit"]))
-        return Report(file, 0, f"proved: |tracking error| <= {bound} from {settled:g} s on", made)
-    seen = number(data["validation"]["largest_error_m"], "largest_error_m")
-    need(seen >= 0, "largest_error_m must not be negative")
-    if seen > coupling.output([member.claim.half_widths[0] for member in members]):
+    if wrong:
+        text = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"
+        return Report(file, 1, f"not proved: {text}", made)
+    proved = {"tracking_error_m": members[0].claim.ultimate[0] if coupling is None else coupling.stated}
+    if len(members) > 1:
+        proved |= {f"member_error.{m.name}": m.claim.ultimate[0] for m in members}
+    met(data, proved)
+    reach = [member.claim.half_widths[0] for member in members]
+    inside = reach[0] if coupling is None else coupling.output(reach)
+    need(0 <= number(data["validation"]["largest_error_m"], "largest_error_m"), "an error must not be negative")
+    if number(data["validation"]["largest_error_m"], "largest_error_m") > inside:
         return Report(file, 1, "not proved: the recorded simulation leaves the certified envelope", made)
-    bound = milli(coupling.stated, "m")
-    message = (
-        f"proved: |tracking error of the output| <= {bound} from {settled:g} s on, all {len(members)} members together"
-    )
-    return Report(file, 0, message, made)
+    settled, unit = float(members[0].claim.transient), str(members[0].claim.rows[0]["unit"])
+    bound = milli(proved["tracking_error_m"], unit if coupling is None else "m")
+    of = "" if coupling is None else f" of the output, all {len(members)} members together"
+    message = f"proved: |tracking error{of}| <= {bound} from {settled:g} s on"
+    used = [use for member in members for use in member.used]
+    return Report(file, 0, message, made, used, *unsourced(data))
+
+
+def unsourced(data: dict[str, Any]) -> tuple[list[str], list[str]]:
+    """What the study left to the bundled machine, and what is assumed."""
+    joints = data["study"]["plant"]["joints"]
+    bundled, assumed = [], []
+    for member, section in joints.items():
+        before = f"{member}." if len(joints) > 1 else ""
+        bundled += [before + name for name in section.get("bundled", [])]
+        for kind, after in (("parameters", ""), ("ratings", ""), ("limits", " limit")):
+            entries = section.get(kind, {}).items()
+            assumed += [before + name + after for name, entry in entries if entry["source"] == "assumed"]
+    return bundled, assumed
 
 
 def check_file(path: Path) -> Report:
     """Re-prove one file."""
+    shown = plainly(str(path))
     try:
-        if path.stat().st_size > MAX_BYTES:
-            return Report(str(path), 2, f"unreadable: a gain file has at most {MAX_BYTES} bytes")
-        return check_text(path.read_text(encoding="utf-8"), str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        return Report(str(path), 2, f"unreadable: {error}")
+        with path.open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+        if len(content) > MAX_BYTES:
+            return Report(shown, 2, f"unreadable: a gain file has at most {MAX_BYTES} bytes")
+        return check_text(content.decode("utf-8-sig"), shown)
+    except UnicodeDecodeError:
+        return Report(shown, 2, "unreadable: it is not UTF-8 text")
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else "no such file"
+        return Report(shown, 2, f"unreadable: {reason}")
+
+
+def plainly(text: str) -> str:
+    """Text without anything that a terminal would not print as it stands."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Check files; print one verdict a file and one line an obligation."""
+    """Check files: for each a verdict, with -v one line an obligation."""
     parser = argparse.ArgumentParser(description="Re-prove gain files from the files alone.")
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
     parser.add_argument("--json", action="store_true", help="print the verdicts as JSON")
+    parser.add_argument("-v", "--verbose", action="store_true", help="show every obligation")
     options = parser.parse_args(arguments)
     reports = [check_file(path) for path in options.files]
-    show(reports, as_json=options.json)
+    show(reports, as_json=options.json, verbose=options.verbose)
     return max(report.status for report in reports)
 
 
-def several(report: Report) -> bool:
-    """Whether a report is of more than one member."""
-    return len({o.member for o in report.obligations if o.member}) > 1
-
-
-def show(reports: list[Report], *, as_json: bool) -> None:
+def show(reports: list[Report], *, as_json: bool, verbose: bool = False) -> None:
     """Print the verdicts."""
     if as_json:
-        rows = [{**r.__dict__, "obligations": [o.__dict__ for o in r.obligations]} for r in reports]
+        kinds = ("obligations", "uses")
+        rows = [{**r.__dict__, **{k: [e.__dict__ for e in getattr(r, k)] for k in kinds}} for r in reports]
         print(json.dumps(rows, indent=1))
-    else:
-        for report in reports:
-            print(f"{report.file}: {report.message}")
-            for o in report.obligations:
-                name = f"{o.member}: {o.name}" if several(report) and o.member else o.name
-                print(f"  {o.verdict:9} {name:12} margin {o.margin:.4g} {o.unit}: {o.statement}")
-                if o.remedy:
-                    print(f"            would pass: {o.remedy}")
+        return
+    for report in reports:
+        print(f"{report.file}: {plainly(report.message)}")
+        for line in (*limit_lines(report), *source_lines(report)):
+            print(f"  {line}")
+        for line in obligation_lines(report, everything=verbose):
+            print(f"  {line}")
+
+
+def limit_lines(report: Report) -> list[str]:
+    """What is certified of the limits, in lines of a terminal."""
+    members = list(dict.fromkeys(use.member for use in report.uses))
+    lines = []
+    for member in members:
+        shares = ", ".join(f"{u.name} {percent(u.share, up=True)}" for u in report.uses if u.member == member)
+        before = f"{member}: " if len(members) > 1 else ""
+        lines += wrapped(f"{before}of its limits at most: {shares}")
+    return lines
+
+
+def source_lines(report: Report) -> list[str]:
+    """What the numbers rest on, in lines of a terminal."""
+    lines = wrapped(f"still the bundled machine's: {', '.join(report.bundled)}") if report.bundled else []
+    return lines + (wrapped(f"assumed: {', '.join(report.assumed)}") if report.assumed else [])
+
+
+def obligation_lines(report: Report, *, everything: bool) -> list[str]:
+    """Obligations, all or those that fail, in lines of a terminal."""
+    many = len({o.member for o in report.obligations if o.member}) > 1
+    lines = []
+    for o in report.obligations:
+        if everything or o.verdict != "proved":
+            name = f"{o.member}: {o.name}" if many and o.member else o.name
+            lines += wrapped(f"{o.verdict} {name}, margin {downward(o.margin)} {o.unit}: {o.statement}")
+            lines += wrapped(f"would pass: {o.remedy}", "    ") if o.remedy else []
+    return lines
+
+
+def wrapped(text: str, indent: str = "") -> list[str]:
+    """Lines of at most 78 columns."""
+    return textwrap.wrap(text, 76, initial_indent=indent, subsequent_indent=indent + "  ")
 
 
 if __name__ == "__main__":

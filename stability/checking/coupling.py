@@ -12,14 +12,14 @@ from itertools import product
 from typing import Any
 
 from .arithmetic import ONE, ZERO, Interval, add, down, magnitude, mul, neg, root, symmetric, up
+from .effects import felt
 from .fixed import slopes
 from .forms import derivative
-from .limits import CARRIED, LOAD_PARTS, NAME, SPEED_PARTS, NotProvedError, need
+from .limits import CARRIED, LEAST_EFFECT, LOAD_PARTS, NAME, SPEED_PARTS, NotProvedError, need
 from .matrices import dot
 from .member import Member, accelerating
 from .motion import cut, motion_of, slices
-from .obligation import Obligation, decided
-from .obligations import milli
+from .obligation import Obligation, decided, milli
 from .parsing import number, numbers, reads, valid_program
 
 
@@ -84,6 +84,12 @@ class Coupling:
         statement = f"the references of all {self.count} members share their knots"
         made.append(decided("motion", statement, Fraction(len(self.slices)), "slices", "references of one duration"))
         worst, which = self._loads()
+        middle = {name: float(low + high) / 2 for name, (low, high) in self.disturbed.items()}
+        along = {
+            name: float(sum(self.slices[len(self.slices) // 2][j][order])) / 2 for name, j, order in self.signals
+        }  # fmt: skip
+        effect, weakest = felt(self.loads, {**along, **middle}, self.disturbed)
+        need(effect > LEAST_EFFECT, f"the loads do not change with {weakest}")
         statement = f"what the members do to each other is inside what each was proved under; the tightest is {which}"
         remedy = "smaller guarantees, or gains that are proved under more load"
         made.append(decided("loads", statement, worst, "1", remedy))

@@ -51,4 +51,6 @@ def float_apply(operator: str, a: float, b: float = 0.0) -> float:
     simple = {"add": a + b, "sub": a - b, "mul": a * b, "neg": -a, "sq": a * a}
     if operator in simple:
         return simple[operator]
+    if operator in ("sin", "cos"):
+        return math.sin(a) if operator == "sin" else math.cos(a)
     return a / b if operator == "div" else math.tanh(a) if operator == "tanh" else math.sqrt(a)

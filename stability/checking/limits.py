@@ -9,7 +9,17 @@ import re
 from fractions import Fraction
 
 #: What must be proved of every member whatever its law.
-COMMON = ("non-vacuity", "reference", "invariance", "authority", "sampling", "adaptation", "rounding", "accuracy")
+COMMON = (
+    "plant",
+    "non-vacuity",
+    "reference",
+    "invariance",
+    "authority",
+    "sampling",
+    "adaptation",
+    "rounding",
+    "accuracy",
+)
 SCHEMA = "hdmm-opt/gains/2"
 #: What must be proved of each member for its law and its kind of certificate; a file that leaves one out is refused.
 REQUIRED = {
@@ -18,17 +28,19 @@ REQUIRED = {
         "sampled": ("contraction", *COMMON),
     }
 }
-#: What must be proved beside it where members push each other, and where an observer stands for a measured speed.
-COUPLED, OBSERVED = ("guarantees", "motion", "loads", "coupling", "output"), ("guarantees", "observer")
 #: Vectors of each kind of certificate.
 VECTORS = {"composition": ("weights", "young", "leak"), "sampled": ("reach", "start", "shape")}
-MAX_BYTES, MAX_DIGITS, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 20_000_000, 300, 12_000, 8, 5_000
-#: Cells of a sampled certificate, digits of its numbers, and (vertices + 8) n³ summed over its cells.
-MAX_CELLS, MAX_CELL_DIGITS, MAX_VERTICES = 64, 60, 40_000
-#: Interval products that one member and the coupling of a machine may take; a file of ours takes a tenth of it.
-MAX_PRODUCTS, MAX_COUPLED = 100_000, 20_000_000
+MAX_BYTES, MAX_DIGITS, MAX_EXPONENT, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 2_000_000, 60, 60, 12_000, 8, 1_000
+#: Cells of a sampled certificate.
+MAX_CELLS = 64
+#: A range of an assumption is that of the study to this share: it is written rounded outwards.
+ROUND = Fraction(1, 10**12)
+#: An effect of what a study states, relative to all that moves a row, below which it counts for none.
+LEAST_EFFECT = Fraction(1, 10**9)
+#: Interval products that all members and the coupling of a machine may take; files of ours take up to half.
+MAX_PRODUCTS, MAX_COUPLED = 250_000, 4_500_000
 #: Members of a machine, and slices of time that its motion may be cut into.
-MAX_MEMBERS, MAX_SLICES = 8, 4_000
+MAX_MEMBERS, MAX_SLICES = 8, 1_000
 #: Names of the parameter that holds a member's own part of the bodies' inertia.
 CARRIED = ("load_mass", "load_inertia")
 #: Parts of the ranges of speed and load in which the answer of an acceleration to a load is bounded.
@@ -43,7 +55,7 @@ SCALE, MAX_FIXED = 160, 4_000
 #: Bits of the denominators of a reference's numbers.
 MAX_BITS = 400
 #: A unit, such as "kg m^2", "N m" or "rad/s".
-UNIT_TEXT = re.compile(r"[A-Za-z]{1,4}(\^[2-4])?( [A-Za-z]{1,4}(\^[2-4])?){0,3}(/[A-Za-z]{1,4}(\^[2-4])?)?")
+UNIT_TEXT = re.compile(r"1|[A-Za-z]{1,4}(\^[2-4])?( [A-Za-z]{1,4}(\^[2-4])?){0,3}(/[A-Za-z]{1,4}(\^[2-4])?)?")
 NAME, NUMBER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}"), re.compile(r"-?[0-9]+(/[0-9]+|(\.[0-9]+)?([eE][+-]?[0-9]+)?)")
 
 

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from .arithmetic import up
 from .claim import Claim
+from .course import follows
 from .golden import golden_agree
 from .limits import REQUIRED, need
 from .loop import Loop
-from .obligation import Obligation
-from .obligations import obligations
+from .obligation import Obligation, Use, downward
+from .obligations import obligations, uses
 from .parsing import number
 from .reading import read
 from .sampled import Held
+from .statement import consistent
 
 
 @dataclass(frozen=True)
@@ -32,38 +33,35 @@ class Member:
     made: list[Obligation]
     reached: tuple[Fraction, Fraction, Fraction] | None
     ultimate: Fraction
+    used: list[Use]
     failed: str
 
 
-def check_member(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Member:
+def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     """Re-prove one member under its own assumptions."""
+    entry = data["members"][which]
     claim = read(data, entry, coupled)
+    consistent(data, entry, claim)
+    follows(data, entry, claim, which)
     made, loop, verdict = obligations(claim)
     agree = golden_agree(entry["golden"], claim)
     seen = number(data["validation"]["members"][claim.name]["largest_error"], "largest_error")
     need(seen >= 0, "largest_error must not be negative")
     rate = number(entry["certificate"]["envelope"]["rate"], "rate")
-    failed = missing(data, REQUIRED[data["study"]["controller"]["law"]][claim.kind], claim.name)
+    required = REQUIRED[data["study"]["controller"]["law"]][claim.kind]
+    need(sorted(o.name for o in made) == sorted(required), "the checker has not decided what the law needs")
+    failed = ""
     wrong = [o for o in made if o.verdict != "proved"]
-    if not failed and wrong:
-        failed = f"{wrong[0].name} (margin {wrong[0].margin:.4g} {wrong[0].unit})"
-    elif not failed and not rate <= claim.decay / (2 if claim.kind == "composition" else 1):
+    if wrong:
+        failed = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"
+    elif not rate <= claim.decay / (2 if claim.kind == "composition" else 1):
         failed = "the envelope states a faster rate"
-    elif not failed and not agree:
+    elif not agree:
         failed = "the golden vectors do not follow from the gains and the law"
-    elif not failed and seen > claim.half_widths[0]:
+    elif seen > claim.half_widths[0]:
         failed = "the recorded simulation leaves the certified envelope"
     tube = tube_of(claim, verdict) if isinstance(verdict, Held) and len(claim.rows) > accelerating(claim) else None
-    return Member(claim.name, claim, loop, made, tube, verdict.ultimate(0), failed)
-
-
-def missing(data: dict[str, Any], required: Iterable[str], member: str) -> str:
-    """What to say of an obligation that the file does not record as proved, exactly once; empty where all are."""
-    recorded = [o["name"] for o in data["obligations"] if o["verdict"] == "proved" and o.get("member", "") == member]
-    for name in required:
-        if recorded.count(name) != 1:
-            return f"the file leaves out the obligation {name}"
-    return ""
+    return Member(claim.name, claim, loop, made, tube, verdict.ultimate(0), uses(claim, loop), failed)
 
 
 def tube_of(claim: Claim, verdict: Held) -> tuple[Fraction, Fraction, Fraction]:

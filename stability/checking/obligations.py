@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from .arithmetic import WORK, root, up
+from .arithmetic import root, up
 from .claim import Claim
 from .composition import Composed
 from .deviation import Deviation
-from .limits import MAX_PRODUCTS, ROUNDING, NotProvedError
+from .effects import least_effect
+from .limits import LEAST_EFFECT, ROUNDING, NotProvedError
 from .loop import Loop
-from .obligation import Obligation, decided
+from .obligation import Obligation, Use, below, decided, milli, percent
 from .sampled import Held
 
 
@@ -88,7 +89,6 @@ def vacuity(claim: Claim) -> Fraction:
 
 def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     """Decide every obligation of the law; with the closed loop, and the verdicts on it."""
-    WORK.begin(MAX_PRODUCTS)
     made: list[Obligation] = []
 
     def state(name: str, statement: str, margin: Fraction, unit: str, remedy: str, strict: bool = True) -> None:
@@ -100,6 +100,11 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     if made[0].verdict != "proved":
         raise NotProvedError("the certificate is about an empty set (obligation non-vacuity)")
     loop, verdict = judge(claim, ROUNDING)
+    sizes = {name: float(loop.signal(name)) for name in (*(row["state"] for row in claim.rows), *claim.inputs)}
+    effect, weakest = least_effect(claim, sizes)
+    moved = percent(effect, up=False)
+    statement = f"the plant feels everything that the study states, {weakest} the least: {moved} of what moves its row"
+    state("plant", statement, effect - LEAST_EFFECT, "1", f"a plant that feels {weakest}")
     span = claim.reference[0]
     inside = min(span[0] - claim.stroke[0], claim.stroke[1] - span[1])
     statement = "the reference is continuous to its acceleration, ends at rest and stays inside the stroke"
@@ -109,7 +114,8 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     state(name, statement, spare, "1/s", anew, False)
     state("invariance", "no trajectory from the initial set leaves the assumed box", verdict.invariance(), "1", anew)
     slack, unit, which = min(authority(claim, loop), key=lambda entry: entry[0] / scale(claim, entry[2]))
-    statement = f"every limit holds over the certified set; the tightest is {which}"
+    used = percent(1 - slack / scale(claim, which), up=True)
+    statement = f"every limit holds over the certified set; the tightest is {which}, of which {used} are used"
     state("authority", statement, slack, unit, f"a limit on {which} that is {float(-slack) * 1.001:.4g} {unit} wider")
     statement, spare = verdict.sampling()
     state("sampling", f"{statement} at {float(1 / claim.period):g} Hz", spare, "1", f"a faster rate, or {anew}")
@@ -131,16 +137,11 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
 
 
 def scale(claim: Claim, name: str) -> Fraction:
-    """The size of a limit, to compare margins of different units."""
-    return next((limit["value"] for limit in claim.limits if limit["name"] == name), claim.stroke[1] - claim.stroke[0])
+    """The size of a limit, to compare margins of different units: half the way for the stroke."""
+    half = (claim.stroke[1] - claim.stroke[0]) / 2
+    return next((limit["value"] for limit in claim.limits if limit["name"] == name), half)
 
 
-def milli(bound: Fraction, unit: str) -> str:
-    """A bound in thousandths of its unit, four digits, rounded up."""
-    exponent = 0
-    size = bound * 1000
-    while size >= 10_000:
-        size, exponent = size / 10, exponent + 1
-    while 0 < size < 1_000:
-        size, exponent = size * 10, exponent - 1
-    return f"{float(-(-size // 1)) * 10.0**exponent:.4g} m{unit}"
+def uses(claim: Claim, loop: Loop) -> list[Use]:
+    """The share of every limit that is certified to be used at most."""
+    return [Use(claim.name, name, -below(slack / scale(claim, name) - 1)) for slack, _, name in authority(claim, loop)]

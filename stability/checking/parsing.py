@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
-from .limits import MAX_BYTES, MAX_DIGITS, MAX_OPERATIONS, NUMBER, SCHEMA, UnreadableError, need
+from .limits import MAX_BYTES, MAX_DIGITS, MAX_EXPONENT, MAX_OPERATIONS, NUMBER, SCHEMA, UnreadableError, need
 
 
 def wrong_schema(found: Any) -> str:
@@ -37,10 +37,9 @@ def rational(text: str, what: str = "a number") -> Fraction:
     need(len(text) <= MAX_DIGITS, f"{what} has over {MAX_DIGITS} digits")
     need(NUMBER.fullmatch(text) is not None, f"{what} must be a finite number: got {text[:40]!r}")
     exponent = text.lower().partition("e")[2] or "0"
-    need(abs(int(exponent)) <= 300, f"{what} has an exponent beyond 300: {text[:40]}")
+    need(abs(int(exponent)) <= MAX_EXPONENT, f"{what} has an exponent beyond {MAX_EXPONENT}: {text[:40]}")
     need(not text.endswith("/0"), f"{what} divides by zero")
     value = Fraction(text)
-    need(abs(value) < Fraction(10) ** 300, f"{what} is beyond 1e300")
     return value
 
 
@@ -126,6 +125,8 @@ def valid_program(program: Any, what: str, *, turning: bool = False) -> dict[str
         clean.append([operator, *arguments])
     outputs = [index(o, len(clean), what) for o in program.get("outputs", [])]
     need(bool(outputs), f"{what} has no output")
+    names = list(dict.fromkeys(arguments[0] for operator, *arguments in clean if operator == "input"))
+    need(sorted(program["inputs"]) == sorted(names), f"{what} does not list the inputs that it has")
     return {"operations": clean, "outputs": outputs}
 
 

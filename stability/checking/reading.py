@@ -12,9 +12,10 @@ from typing import Any
 
 from .arithmetic import Interval, magnitude
 from .claim import Claim, cell_of
-from .limits import CARRIED, MAX_CELLS, MAX_ROWS, NAME, REQUIRED, UNIT_TEXT, VECTORS, UnreadableError, need
+from .limits import CARRIED, MAX_CELLS, MAX_ROWS, NAME, REQUIRED, ROUND, UNIT_TEXT, VECTORS, UnreadableError, need
 from .parsing import index, number, numbers, reads, valid_program
 from .reference import reference_bounds
+from .statement import stroke_of
 
 
 def read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
@@ -51,7 +52,7 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     cells = [cell_of(cell, n) for cell in certificate["cells"]] if kind == "sampled" else []
     covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod(split)
     need(kind != "sampled" or covered, "the cells do not cover the inertias")
-    stroke = numbers(section["stroke"], 2, "stroke")
+    stroke = numbers(stroke_of(section, str(rows[0]["unit"])), 2, "stroke")
     return Claim(
         name=entry["name"], rows=rows, input_map=input_map, inputs=model["inputs"], plant=plant, law=terms,
         parameters=assumed["parameter"], disturbances=assumed["disturbance"], nominal=nominal,
@@ -187,6 +188,8 @@ def assumptions(
         bounds = found[kind][name]
         need(low <= high, f"the study's range of {name} is upside down")
         need(bounds[0] <= low and high <= bounds[1], f"the assumption {kind}.{name} is narrower than the study's")
+        room = ROUND * max(abs(low), abs(high))
+        need(low - bounds[0] <= room and bounds[1] - high <= room, f"the assumption {kind}.{name} is not the study's")
     if not coupled:
         disturbed = {name for kind, name, _, _ in stated if kind == "disturbance"}
         need(disturbed == set(found["disturbance"]), "the disturbances are not those of the study")

@@ -1,6 +1,7 @@
 """Bounds of a reference for all t from its control points.
 
-Theorem: a spline lies in the hull of its control points (de Boor 1978). Must fail: jumps, a moving end, other
+Theorem: a spline lies in the hull of its control points (de Boor 1978), a piece of it in that of its Bezier points,
+found by blossoms (Ramshaw 1989). Must fail: jumps, a moving end, other
 bounds.
 """
 
@@ -10,9 +11,12 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-from .arithmetic import Interval
+from .arithmetic import WORK, Interval, down, up
 from .limits import MAX_BITS, MAX_COEFFICIENTS, need
 from .parsing import number, numbers
+
+#: What a piece of a spline costs, in products.
+PIECE_COST = 200
 
 
 def reference_bounds(reference: dict[str, Any]) -> list[Interval]:
@@ -51,3 +55,34 @@ def reference_bounds(reference: dict[str, Any]) -> list[Interval]:
         need(close, "the stated derivative bounds are not those of the splines")
     at_rest = [[], *([Fraction(0)] for _ in range(3))]
     return [(min(h + zero), max(h + zero)) for h, zero in zip(hulls, at_rest, strict=True)]
+
+
+def ranges_on(
+    knots: list[Fraction], points: list[Fraction], span: int, ends: tuple[Fraction, Fraction]
+) -> list[Interval]:
+    """Hulls of the Bezier points of position … jerk of a spline on a part of a span, by blossoms (Ramshaw 1989)."""
+    WORK.one(PIECE_COST)
+    degree = 5
+    curve = [
+        blossom(knots, points, span, [ends[0]] * (degree - k) + [ends[1]] * k) for k in range(degree + 1)
+    ]  # fmt: skip
+    found = []
+    for order in range(4):
+        found.append((down(min(curve)), up(max(curve))))
+        curve = [(degree - order) * (b - a) / (ends[1] - ends[0]) for a, b in pairwise(curve)]
+    return found
+
+
+def blossom(knots: list[Fraction], points: list[Fraction], span: int, arguments: list[Fraction]) -> Fraction:
+    """The symmetric multi-affine form of a spline's piece."""
+    degree = len(arguments)
+    values = points[span - degree : span + 1]
+    for level, t in enumerate(arguments):
+        following = []
+        for j in range(degree - level):
+            first = knots[span - degree + level + 1 + j]
+            last = knots[span + 1 + j]
+            share = (t - first) / (last - first)
+            following.append(values[j] + share * (values[j + 1] - values[j]))
+        values = following
+    return values[0]

@@ -215,7 +215,10 @@ def _grown(assumed: Bounds, needed: Bounds, factors: Array) -> Bounds:
         key: _hull(assumed.disturbances[key], value + Interval.symmetric((float(factor) - 1) * value.magnitude))
         for (key, value), factor in zip(needed.disturbances.items(), factors[:count], strict=True)
     }
-    noise = tuple(max(a, b * float(f)) for a, b, f in zip(assumed.noise, needed.noise, factors[count:], strict=True))
+    # what has room stays: an error that nothing makes larger is that of the sensor
+    noise = tuple(
+        a if a >= b else b * float(f) for a, b, f in zip(assumed.noise, needed.noise, factors[count:], strict=True)
+    )
     return replace(needed, disturbances=disturbances, noise=noise)
 
 

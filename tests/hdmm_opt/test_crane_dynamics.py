@@ -21,7 +21,7 @@ from hdmm_opt.machines.crane_dynamics import (
 )
 from hdmm_opt.machines.crane_geometry import BASE, ELBOW, LIFT, TELESCOPE, TILT
 from hdmm_opt.machines.rigid_body import GRAVITY
-from hdmm_opt.plants.pmsm_emla import POLE_PAIRS, defaults, pmsm_emla
+from hdmm_opt.plants.pmsm_emla import defaults, pmsm_emla, transmission
 
 URDF = (Path(hdmm_opt.machines.__file__).parent / "crane.urdf").read_text(encoding="utf-8")
 LOW, HIGH = (
@@ -260,10 +260,10 @@ def test_the_drives_agree_with_the_actuators_own_model():
             ca.Function("g", [w, v, a], [levers(w) * a + ca.jtimes(levers(w), w, v) * v])(case, rate, gain)
         ).ravel()
         for i in range(3):
-            rod = speed[i] * known["transmission"]
+            rod = speed[i] * transmission(known)
             mass, push = (np.array(x).ravel() for x in rows([0.3, rod, current[i], 0.0], [0, 0], [force[i]], values))
             assert push[1] == pytest.approx(mass[1] * second[i], rel=1e-6, abs=1e-6)
-            assert torque[i] == pytest.approx(1.5 * POLE_PAIRS * known["flux"] * current[i])
+            assert torque[i] == pytest.approx(known["torque_constant"] * current[i])
         assert (voltage >= 0).all()
 
 
@@ -289,8 +289,8 @@ def test_the_voltage_moves_the_current_along_the_motion():
     for t in (0.3, 1.7, 2.9):
         current, voltage, speed = at(t)
         slope = (at(t + 1e-5)[0] - at(t - 1e-5)[0]) / 2e-5
-        electrical = POLE_PAIRS * speed
-        across = known["resistance"] * current + known["inductance"] * slope + known["flux"] * electrical
+        electrical = known["pole_pairs"] * speed
+        across = known["resistance"] * current + known["inductance"] * slope + known["torque_constant"] / 6 * electrical
         along = known["inductance"] * electrical * current
         assert voltage == pytest.approx(np.hypot(across, along), rel=1e-6)
 

@@ -6,11 +6,12 @@ import pytest
 from hdmm_opt import study
 from hdmm_opt.cli import falsify as verb
 from hdmm_opt.cli import simulate, statuses
-from hdmm_opt.design import falsification
+from hdmm_opt.design import attack, falsification
 from hdmm_opt.design.falsification import falsify
 from hdmm_opt.errors import DefectError
 from hdmm_opt.files.read import read
 from hdmm_opt.files.result import Witness
+from hdmm_opt.plants.pmsm_emla import lead_angle_tangent, transmission
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop, scenarios
 from stability import checker
@@ -33,8 +34,9 @@ def test_finds_the_static_worst_case_of_an_overdamped_loop(loop):
     assert found.runs <= 60
     (member,) = loop.problem.members
     p = member.plant.parameters
-    r = p["transmission"].value
-    loss = p["screw_friction"].value * 1.54 / p["lead_angle_tangent"].value + p["gear_loss"].value * 1.5
+    values = {name: entry.value for name, entry in p.items()}
+    r = transmission(values)
+    loss = p["screw_friction"].value * 1.54 / lead_angle_tangent(values) + p["gear_loss"].value * 1.5
     torque = r * (1 + loss) * (76e3 + 1.5 * p["coulomb_friction"].value)
     torque += 1.3 * p["viscous_friction"].value * member.reference.bounds()[1][1] / r
     static = torque / (0.97 * 0.5 * 6000.0 * 0.5 * 24.0)
@@ -87,7 +89,7 @@ def test_a_witness_outside_the_envelope_is_a_defect(tmp_path, gain_text, monkeyp
         found = real(*arguments[:3], 2, *arguments[4:], **named)
         return replace(found, largest_error=0.01, largest_errors={"actuator": 0.01})
 
-    monkeypatch.setattr(falsification, "falsify", lie)
+    monkeypatch.setattr(attack, "falsify", lie)
     with pytest.raises(DefectError, match="please report"):
         verb.run(path, 5, 1)
     assert path.read_text(encoding="utf-8") == gain_text

@@ -14,11 +14,13 @@ from hdmm_opt.design.refusal import diagnose
 from hdmm_opt.design.shrinking import provable_share, shrunk
 from hdmm_opt.design.space import Window
 from hdmm_opt.design.start import starting_point
+from hdmm_opt.design.validation import validate
 from hdmm_opt.errors import DefectError
 from hdmm_opt.files.gain_file import build
 from hdmm_opt.files.seal import prove
 from hdmm_opt.files.sections import short
 from hdmm_opt.files.text import write_text
+from hdmm_opt.files.validation import to_data
 from hdmm_opt.problem import assemble
 from hdmm_opt.problem.margins import violation
 from hdmm_opt.simulation import Loop, Scenario
@@ -41,8 +43,9 @@ def test_the_first_stage_ends_at_gains_that_the_checker_proves(name):
     gains = starting_point(problem, Progress()).gains
     contracts = contracts_of(problem, gains)
     assert not isinstance(contracts, Failure) and violation(problem, contracts, gains) == 0.0
-    shown = {"members": {"actuator": {"largest_error": 0.0}}, "requirements": []}
-    _, report = prove(build(Loop(problem), gains, contracts, shown))
+    loop = Loop(problem)
+    shown = validate(loop, gains, seed=1, monte_carlo=0, jobs=1, progress=lambda part: None)
+    _, report = prove(build(loop, gains, contracts, to_data(problem, shown, contracts)))
     assert report.status == 0, report.message
 
 
@@ -175,7 +178,7 @@ def test_the_share_of_uncertainty_that_would_pass_passes():
 def test_a_file_is_checked_once(monkeypatch):
     """The exact check of a design is one run of the checker."""
     count, real = [], checker.check_text
-    monkeypatch.setattr(checker, "check_text", lambda *arguments: count.append(1) or real(*arguments))
+    monkeypatch.setattr(checker, "check_text", lambda *given, **named: count.append(1) or real(*given, **named))
     data = emla("emla-p2")
     data["controller"]["gains"] = {name: {"value": value} for name, value in (("beta_1", 24.0), ("beta_2", 6000.0))}
     data["validation"] |= {"monte_carlo": 0, "worst_case": False}

@@ -12,7 +12,7 @@ from hdmm_opt.control.law import step_function
 from hdmm_opt.plants import SOURCES, Limit, Plant, defaults, effort, pmsm_emla
 from hdmm_opt.plants import pmsm_emla as build
 from hdmm_opt.plants.parameter import Parameter
-from hdmm_opt.plants.pmsm_emla import MAXIMUM_SPEED, PEAK_CURRENT, PHASE_VOLTAGE, RATED_CURRENT, TORQUE_CONSTANT
+from hdmm_opt.plants.pmsm_emla import lead_angle_tangent, ratings, transmission
 
 
 def rate(plant, x, u, w, **changes):
@@ -23,15 +23,19 @@ def rate(plant, x, u, w, **changes):
 
 def test_figures_of_the_machine_follow_from_its_table():
     """Torques at rated and peak current, speed at 3000 rpm, EMF against the bus of a 380 V drive (machines.md)."""
-    assert TORQUE_CONSTANT * RATED_CURRENT == pytest.approx(37.1, abs=0.1)
-    assert TORQUE_CONSTANT * PEAK_CURRENT == pytest.approx(77.5, abs=0.1)
-    r = defaults("torque")["transmission"].value
+    limits = {limit.name: limit.value for limit in build("voltage").limits}
+    constant = ratings("torque")["torque_constant"].value
+    assert constant * 23.1 * math.sqrt(2) == pytest.approx(37.1, abs=0.1)
+    assert constant * limits["current"] == pytest.approx(77.5, abs=0.1)
+    values = build("torque").values()
+    r = transmission(values)
+    assert math.degrees(math.atan(lead_angle_tangent(values))) == pytest.approx(4.55, abs=1e-3)
     assert r == pytest.approx(3.307e-4, rel=1e-4)
     assert 3000 * 2 * math.pi / 60 * r == pytest.approx(0.104, abs=2e-4)
     emf = 4 * 0.134 * math.sqrt(2) * 3000 * 2 * math.pi / 60
     assert emf == pytest.approx(238, abs=1)
-    at_top = 4 * 0.134 * math.sqrt(2) * (MAXIMUM_SPEED / r) * math.sqrt(3)
-    assert at_top == pytest.approx(533, abs=2) and PHASE_VOLTAGE * math.sqrt(3) == pytest.approx(380 * math.sqrt(2))
+    at_top = 4 * 0.134 * math.sqrt(2) * (limits["speed"] / r) * math.sqrt(3)
+    assert at_top == pytest.approx(533, abs=2) and limits["voltage"] * math.sqrt(3) == pytest.approx(380 * math.sqrt(2))
     assert 75e3 * r == pytest.approx(24.8, abs=0.05) and 75e3 * r / 0.8 == pytest.approx(31.0, abs=0.05)
 
 
@@ -50,7 +54,7 @@ def test_screw_efficiency_in_both_directions(friction, driving, back):
         )
     }
     plant = pmsm_emla("torque", parameters)
-    r = plant.parameters["transmission"].value
+    r = transmission(plant.values())
     for speed, efficiency in ((0.05, driving), (-0.05, back)):
         demand = plant.demand(1, 0, x=ca.SX([0.2, speed, 0]), w=ca.SX([50e3]), p=ca.SX(list(plant.values().values())))
         torque = float(ca.evalf(ca.SX(demand)))
@@ -64,11 +68,11 @@ def test_energy_balance_of_the_electrical_part():
     q = plant.values()
     x, u = [0.2, 0.06, 21.0, -7.0], [180.0, -35.0]
     change = rate(plant, x, u, [60e3])
-    speed = x[1] / q["transmission"]
+    speed = x[1] / transmission(q)
     electrical = 1.5 * (u[0] * x[2] + u[1] * x[3])
     copper = 1.5 * q["resistance"] * (x[2] ** 2 + x[3] ** 2)
     magnetic = 1.5 * q["inductance"] * (x[2] * change[2] + x[3] * change[3])
-    mechanical = 1.5 * 4 * q["flux"] * x[2] * speed
+    mechanical = q["torque_constant"] * x[2] * speed
     assert electrical == pytest.approx(copper + magnetic + mechanical, rel=1e-12)
 
 
@@ -127,7 +131,7 @@ def test_the_amplitude_limit_scales_the_vector():
     gains = np.array([[30, 0, 1, 1], [6000, 0, 1, 1], [90, 0, 1, 1], [90, 0, 1, 1]], dtype=float)
     x = [0.21, 0.0, 10.0, 30.0]
     u = np.array(step(x, [0.2, 0, 0, 0], [0] * 4, gains.ravel(), list(law.plant.values().values()), 0.0)[0]).ravel()
-    assert np.linalg.norm(u) == pytest.approx(PHASE_VOLTAGE) and u[0] * u[1] != 0
+    assert np.linalg.norm(u) == pytest.approx(law.plant.limits[0].value) and u[0] * u[1] != 0
 
 
 def test_modelling_terms_cancel_the_plant_at_nominal_values():
@@ -142,7 +146,7 @@ def test_modelling_terms_cancel_the_plant_at_nominal_values():
     assert mechanical == pytest.approx(0.1, rel=1e-12)
     assert terms[0] == pytest.approx(0.05)
     plain = replace(law, modelling=("mechanics",)).terms(ca.SX(x), ca.SX(r), ca.SX(nominal), ca.SX(load))[1]
-    screw = law.plant.parameters["transmission"].value * 60e3 / (1.5 * 4 * law.plant.parameters["flux"].value)
+    screw = transmission(law.plant.values()) * 60e3 / law.plant.parameters["torque_constant"].value
     assert screw < float(ca.evalf(ca.SX(plain))) < terms[1]  # acceleration and viscous friction, but no loss
 
 
@@ -173,7 +177,7 @@ def chain_plant(order):
         targets=("reference", *range(order - 1)), controlled=(True,) * order, input_map=(order - 1,),
         x=x, u=u, w=w, p=p, mass=ca.SX.ones(order), force=force,
         limits=(Limit(name="u", signals=("u",), value=1e9, unit="m", source="assumed"),), stroke=(-1.0, 1.0), outputs={},
-        output_units={}, operating=(0.0,) * order,
+        output_units={},
     )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from hdmm_opt.errors import InvalidInputError
 from hdmm_opt.machines.rigid_body import Payload, inverse_dynamics
 from hdmm_opt.machines.urdf import bodies
 from hdmm_opt.plants import pmsm_emla
+from hdmm_opt.plants.pmsm_emla import lead_angle_tangent, transmission
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Fault, Loop, Run, Scenario, scenarios, within_assumptions
 from stability import Failure
@@ -48,12 +49,12 @@ def under(load, **more):
 def test_agrees_with_an_independent_adaptive_integrator():
     """The same sampled loop, law written by hand, plant written by hand, integrated by SciPy at 1e-10."""
     q = pmsm_emla("torque").values()
-    r, load = q["transmission"], 70e3
+    r, load = transmission(q), 70e3
 
     def plant(t, x, u):
         force = load + q["coulomb_friction"] * np.tanh(x[1] / q["friction_speed"])
         s = np.tanh(force * x[1] / q["power_scale"])
-        loss = s * (q["screw_friction"] / q["lead_angle_tangent"] + q["gear_loss"])
+        loss = s * (q["screw_friction"] / lead_angle_tangent(q) + q["gear_loss"])
         mass = q["motor_inertia"] / r + r * q["load_mass"]
         driving = q["torque_scale"] * x[2] - q["viscous_friction"] * x[1] / r - r * (1 + loss) * force
         return [x[1], driving / (mass * (1 + loss * r * q["load_mass"] / mass)), (u - x[2]) / q["drive_lag"]]
@@ -159,8 +160,8 @@ def test_figures_are_those_of_the_trace():
     assert own.peaks["current"] == signals.outputs["current"].max()
     assert own.peak_input == np.abs(signals.u).max()
     assert own.largest_error == found.largest_error_m and own.maximum_error == found.maximum_error_m
-    transmission = pmsm_emla("torque").values()["transmission"]
-    assert own.energy_j == pytest.approx((torque * signals.x[1]).sum() * 1e-3 / transmission, rel=1e-12)
+    ratio = transmission(pmsm_emla("torque").values())
+    assert own.energy_j == pytest.approx((torque * signals.x[1]).sum() * 1e-3 / ratio, rel=1e-12)
     assert found.itae == pytest.approx((trace.t * error).sum() * 1e-3, rel=1e-12)
     assert found.limit_use >= np.abs(signals.u).max() / 77.0
 

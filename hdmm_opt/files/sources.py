@@ -1,0 +1,45 @@
+"""What the numbers of a machine rest on: what has no source, and what a study leaves to the bundled machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ..plants.own import own_name
+from ..problem import Problem
+
+
+def assumed(problem: Problem) -> tuple[str, ...]:
+    """Everything that has no public source, by member and name."""
+    found, several = list(problem.machine.assumed), len(problem.members) > 1
+    for member in problem.members:
+        prefix, plant = f"{member.name}." if several else "", member.plant
+        numbers = {**plant.parameters, **plant.ratings}
+        found += [f"{prefix}{key}" for key, p in numbers.items() if p.source == "assumed"]
+        found += [f"{prefix}{limit.name} limit" for limit in plant.limits if limit.source == "assumed"]
+    return tuple(found)
+
+
+def assumed_text(problem: Problem) -> str:
+    """The same in one line, with the members of each in brackets."""
+    return _listed(problem, assumed(problem))
+
+
+def bundled_text(problem: Problem) -> str:
+    """What the study leaves to the bundled machine, in one line; empty where nothing."""
+    several = len(problem.members) > 1
+    left = [f"{member}.{name}" if several else name for member, own in problem.machine.bundled.items() for name in own]
+    if not left:
+        return ""
+    model = problem.study.plant.model
+    return f"still {'the defaults of' if own_name(model) else 'of the bundled'} {model}: {_listed(problem, left)}"
+
+
+def _listed(problem: Problem, names: Iterable[str]) -> str:
+    members: dict[str, list[str]] = {}
+    for name in names:
+        member, _, key = name.rpartition(".")
+        members.setdefault(key, []).append(member)
+    whole = list(problem.machine.members)
+    return ", ".join(
+        key if own == [""] else f"{key} ({'all' if own == whole else ', '.join(own)})" for key, own in members.items()
+    )

@@ -1,0 +1,83 @@
+"""Whether a plant and a coupling feel what the study states.
+
+Two floats that differ are a witness that they do; nothing is proved of how much. Obligation: plant. Must fail: a
+plant that multiplies its load by 0, a parameter without effect, a machine that is the same for every payload.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+from .arithmetic import WORK
+from .claim import Claim
+from .forms import walk
+from .golden import float_apply
+from .limits import NotProvedError
+
+#: Shares of the certified size of every state and input at which a plant is looked at, either way.
+SHARES = (0.0, 1e-3, 1e-2, 0.1, 1.0)
+
+
+def least_effect(claim: Claim, sizes: dict[str, float]) -> tuple[Fraction, str]:
+    """The smallest effect on a plant, relative to its row, of going through a stated range; and what has it.
+
+    A number without a range is moved by a percent; one that is zero is left out.
+
+    Args:
+        claim: The statement.
+        sizes: Size of every state and input over the certified set.
+    """
+    stated = {**claim.parameters, **claim.disturbances}
+    middle = {name: float((low + high) / 2) for name, (low, high) in stated.items()}
+    for name, (value, _) in claim.feedforward.items():
+        middle[name] = float(value[0] + value[1]) / 2
+    points = [{s: sign * share * v for s, v in sizes.items()} for sign in (-1.0, 1.0) for share in SHARES]
+    rates = [_rates(claim, {**middle, **point}) for point in points]
+    size = [max(max(abs(r[i]) for r in rates), 1e-300) for i in range(len(claim.rows))]
+    found: list[tuple[Fraction, str]] = []
+    for name, (low, high) in stated.items():
+        ends = _ends(low, high)
+        if ends is None:
+            continue
+        seen = 0.0
+        for point in points:
+            one, other = (_rates(claim, {**middle, **point, name: end}) for end in ends)
+            seen = max(seen, *(abs(a - b) / s for a, b, s in zip(one, other, size, strict=True)))
+        found.append((Fraction(seen), name))
+    return min(found, default=(Fraction(1), "nothing"))
+
+
+def _ends(low: Fraction, high: Fraction) -> tuple[float, float] | None:
+    if low < high:
+        return float(low), float(high)
+    return (float(low), float(low) * 1.01) if low else None
+
+
+def _rates(claim: Claim, values: dict[str, float]) -> list[float]:
+    n, entries = len(claim.rows), run(claim.plant, values.__getitem__)
+    return [entries[n + i] / entries[i] for i in range(n)]
+
+
+def run(program: dict[str, Any], read: Callable[[str], float]) -> list[float]:
+    """Outputs of an operation list in floats."""
+    WORK.one(1 + len(program["operations"]) // 16)
+    try:
+        entries = walk(program, read, float, float_apply)
+    except (ArithmeticError, ValueError):
+        raise NotProvedError("the model has no value at its operating points") from None
+    return [entries[i] for i in program["outputs"]]
+
+
+def felt(
+    program: dict[str, Any], middle: dict[str, float], ranges: Mapping[str, tuple[Fraction, ...]]
+) -> tuple[Fraction, str]:
+    """The smallest effect on the loads of a machine, relative to the largest, of going through each range."""
+    size = max(max(map(abs, run(program, middle.__getitem__))), 1e-300)
+    found: list[tuple[Fraction, str]] = []
+    for name, (low, high) in ranges.items():
+        if low < high:
+            one, other = (run(program, {**middle, name: float(end)}.__getitem__) for end in (low, high))
+            found.append((Fraction(max(abs(a - b) for a, b in zip(one, other, strict=True)) / size), name))
+    return min(found, default=(Fraction(1), "nothing"))

@@ -1,0 +1,199 @@
+"""What a file says more than once, and what it records, against the study and the proof.
+
+Must fail: units, sources, meanings and nominal values that are not the study's, requirements that are not met,
+records that the proof excludes, golden vectors that repeat each other.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+from .claim import Claim
+from .limits import CARRIED, NAME, need
+from .parsing import number, reads
+
+#: Meaning of a gain by its kind.
+MEANINGS = {
+    "beta": "proportional gain", "epsilon": "adaptation gain", "delta": "adaptation rate",
+    "sigma": "leakage of the adaptation",
+}  # fmt: skip
+#: Key of a stroke by the unit of the first state.
+STROKE = {"m": "stroke_m", "rad": "stroke_rad", "m/s": "stroke_m_s", "rad/s": "stroke_rad_s"}
+
+
+def stroke_of(section: dict[str, Any], unit: str) -> Any:
+    """The range of the first state, in its unit."""
+    need(unit in STROKE, f"the first state must be in {', '.join(STROKE)}: got {unit!r:.20}")
+    given = [key for key in STROKE.values() if key in section]
+    need(given == [STROKE[unit]], f"the study must give {STROKE[unit]}, and no other stroke")
+    return section[STROKE[unit]]
+
+
+def consistent(data: dict[str, Any], entry: dict[str, Any], claim: Claim) -> None:
+    """Refuse facts about a member that contradict each other."""
+    study = data["study"]
+    section = study["plant"]["joints"][claim.name]
+    units = {row["state"]: row["unit"] for row in claim.rows}
+    _units(claim, units)
+    _nominal(claim, section, study)
+    _assumed(entry, claim, study, section, units)
+    _gains(entry, claim, units)
+    _terms(claim, study)
+    _bundled(section)
+    derivatives, own = ["", "/s", "/s^2", "/s^3"], claim.rows[0]["unit"].removesuffix("/s")
+    first = 1 if claim.rows[0]["unit"].endswith("/s") else 0
+    names = ("position", "speed", "acceleration", "jerk")
+    for k, bound in enumerate(entry["reference"]["derivative_bounds"]):
+        unit = own + [*derivatives, "/s^4"][first + k]
+        need((bound["name"], bound["unit"]) == (names[k], unit), f"derivative {k} of the reference is in {unit}")
+    golden = [tuple(map(tuple, (v["x"], v["r"], v["theta"]))) for v in entry["golden"]]
+    need(len(set(golden)) == len(golden), "golden vectors must differ from each other")
+
+
+def _units(claim: Claim, units: dict[str, str]) -> None:
+    """A limit is in the unit of what it limits; a rate in that of what it is the rate of."""
+    amplitude = claim.limits[0]["unit"]
+    for limit in claim.limits:
+        for signal in limit["signals"]:
+            need(
+                limit["unit"] == units.get(signal, amplitude),
+                f"the limit on {limit['name']} has the unit of no {signal}",
+            )
+    first, second = claim.rows[0], claim.rows[1] if len(claim.rows) > 1 else None
+    if claim.first == "position" and second is not None:
+        need(second["unit"] == f"{first['unit']}/s", f"{second['state']} must be in {first['unit']}/s")
+    fits = first["unit"].endswith("/s") == (claim.first == "speed")
+    need(fits, f"a {claim.first} cannot be in {first['unit']}")
+
+
+def _nominal(claim: Claim, section: dict[str, Any], study: dict[str, Any]) -> None:
+    """What the law takes for the plant are the study's values; for a load, one of its range."""
+    for name, value in claim.nominal.items():
+        if name in section["parameters"]:
+            stated = number(section["parameters"][name]["value"], name)
+            need(value == stated, f"the nominal value of {name} is not the study's")
+        elif name in claim.parameters:
+            low, high = claim.parameters[name]
+            need(low <= value <= high, f"the nominal value of {name} is outside its range")
+        else:
+            given = study["uncertainty"]["disturbances"].get(name)
+            low, high = claim.disturbances[name] if given is None else [number(v, name) for v in given["range"]]
+            unknown = given is None and value == 0  # the load of a coupling that the law does not know
+            need(unknown or low <= value <= high, f"the nominal value of {name} is outside its range")
+
+
+def _assumed(
+    entry: dict[str, Any], claim: Claim, study: dict[str, Any], section: dict[str, Any], units: dict[str, str]
+) -> None:
+    """Units and sources of the assumptions."""
+    load = {name: d["unit"] for name, d in study["uncertainty"]["disturbances"].items()}
+    for given in entry["assumptions"]:
+        kind, _, name = given["name"].partition(".")
+        stated = section["parameters"].get(name)
+        if kind == "parameter" and stated is not None:
+            wanted = stated["unit"], stated["source"]
+        elif kind == "parameter":  # effectiveness, or a member's own part of the inertia of a machine's bodies
+            wanted = ("1", given["source"]) if name not in CARRIED else (given["unit"], "derived")
+            need(given["source"] in ("derived", "assumed"), f"{given['name']} has another source")
+        elif kind in ("noise", "initial"):
+            wanted = units[name], "study"
+        elif kind == "feedforward_rate":
+            own = next(e["unit"] for e in entry["assumptions"] if e["name"] == f"feedforward.{name}")
+            wanted = f"{own}/s", "study"
+        else:
+            wanted = load.get(name, given["unit"]), "study"
+        need((given["unit"], given["source"]) == wanted, f"{given['name']} must be in {wanted[0]}, source {wanted[1]}")
+
+
+def _gains(entry: dict[str, Any], claim: Claim, units: dict[str, str]) -> None:
+    """Units and meanings of the gains: β maps Q to what the row asks for, ε θ̂ has the unit of β."""
+    order = [f"{kind}_{k + 1}" for k in range(len(claim.controlled)) for kind in MEANINGS]
+    need([gain["name"] for gain in entry["gains"]] == order, "the gains stand in another order")
+    for gain in entry["gains"]:
+        kind, _, place = gain["name"].partition("_")
+        row = claim.controlled[int(place) - 1]
+        state = claim.rows[row]["state"]
+        following = [units[r["state"]] for r in claim.rows if r["target"] == row]
+        ratio = f"({following[0] if following else claim.limits[0]['unit']})/({units[state]})"
+        unit = {"beta": ratio, "epsilon": f"sqrt({ratio}/s)/({units[state]})", "delta": "1", "sigma": "1/s"}[kind]
+        need(gain["unit"] == unit, f"{gain['name']} must be in {unit}")
+        need(
+            gain["meaning"] == f"{MEANINGS[kind]} of subsystem {place} ({state})",
+            f"{gain['name']} means something else",
+        )
+
+
+def _terms(claim: Claim, study: dict[str, Any]) -> None:
+    """A law without modelling terms knows nothing but the rate of its reference."""
+    modelling = study["controller"]["modelling"]
+    need(len(set(modelling)) == len(modelling), "a modelling term stands twice")
+    need(all(NAME.fullmatch(term) for term in modelling), "a modelling term must be a plain name")
+    for k, term in enumerate(claim.law if not modelling else []):
+        allowed = {"r1"} if k == 0 and claim.first == "position" else set()
+        need(reads(term) <= allowed, "the law models something, and the study names no modelling term")
+
+
+def _bundled(section: dict[str, Any]) -> None:
+    """What a study left to the bundled machine is named once, and there."""
+    given = section.get("bundled", [])
+    known = {*section["parameters"], *section.get("ratings", {}), *(f"{name} limit" for name in section["limits"])}
+    need(
+        len(set(given)) == len(given) and set(given) <= {*known, "stroke"}, "bundled names what the study does not have"
+    )
+
+
+def met(data: dict[str, Any], certified: dict[str, Fraction]) -> None:
+    """Refuse requirements that are not the study's or not met, and records that the proof excludes.
+
+    Args:
+        data: The file.
+        certified: What is proved, by the name of the requirement.
+    """
+    kept = ("member_error", "settling_band_m")
+    wanted = {key: value for key, value in data["study"]["requirements"].items() if key not in kept}
+    if len(data["members"]) > 1:
+        wanted |= {f"member_error.{k}": v for k, v in data["study"]["requirements"]["member_error"].items()}
+    rows = data["validation"]["requirements"]
+    need([row["name"] for row in rows] == list(wanted), "the requirements are not those of the study")
+    for row in rows:
+        name, limit, seen = row["name"], number(row["required"], "required"), number(row["simulated"], "simulated")
+        need(limit == number(wanted[name], name), f"{name} is required otherwise in the study")
+        need(0 <= seen <= limit, f"{name} is not met by the recorded runs")
+        if name in certified:
+            need(row["certified"] is not None, f"{name} is proved, and the file does not say so")
+            told = number(row["certified"], "certified")
+            need(certified[name] <= told <= limit, f"{name} states another bound than is proved")
+            need(seen <= told, f"a recorded run passes what is proved of {name}")
+        else:
+            need(row["certified"] is None, f"{name} is stated as proved, and is not")
+    _records(data, certified)
+
+
+def _records(data: dict[str, Any], certified: dict[str, Fraction]) -> None:
+    """Records that the proof excludes, or that contradict each other."""
+    shown, study = data["validation"], data["study"]
+    late = number(shown["largest_error_after_transient_m"], "largest_error_after_transient_m")
+    need(
+        0 <= late <= number(shown["largest_error_m"], "largest_error_m"), "an error after the transient is the largest"
+    )
+    need(late <= certified["tracking_error_m"], "a recorded run passes what is proved of the output")
+    need(set(shown["members"]) == {entry["name"] for entry in data["members"]}, "records are of the members")
+    for entry in data["members"]:
+        own = shown["members"][entry["name"]]
+        need(own["unit"] == entry["model"]["rows"][0]["unit"], "a record is in the unit of its member")
+        ends = [number(own[key], key) for key in ("largest_error_after_transient", "largest_error")]
+        need(0 <= ends[0] <= ends[1], "an error after the transient is larger than the largest")
+        bound = certified.get(f"member_error.{entry['name']}", certified["tracking_error_m"])
+        need(ends[0] <= bound, f"a recorded run passes what is proved of {entry['name']}")
+        watched = study["controller"].get("observer") is not None
+        need(("estimates" in own) == watched, "estimates are recorded where there is an observer, and only there")
+        noise = {a["name"]: a["upper"] for a in entry["assumptions"]}
+        for row, seen in zip(entry["model"]["rows"], own.get("estimates", []), strict=False):
+            inside = number(seen, "an estimate") <= number(noise[f"noise.{row['state']}"], "noise")
+            need(inside, f"a recorded estimate of {entry['name']} passes what is proved")
+    names = [scenario["name"] for scenario in study["validation"]["scenarios"]]
+    need([run["name"] for run in shown["scenarios"]] == names, "the recorded scenarios are not those of the study")
+    drawn = shown["monte_carlo"]
+    need(drawn is None or drawn["met"] == drawn["runs"], "a random run missed a requirement")
+    need(number(shown["integration_error_m"], "integration_error_m") >= 0, "an error must not be negative")
