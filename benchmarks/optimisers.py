@@ -15,11 +15,11 @@ import numpy as np
 from scipy.stats import mannwhitneyu
 
 from hdmm_opt import study
-from hdmm_opt.design.evaluation import make_evaluator
-from hdmm_opt.design.gradient import descent
-from hdmm_opt.design.options import Progress
-from hdmm_opt.design.space import Window
-from hdmm_opt.design.start import starting_point
+from hdmm_opt.jobs.evaluation import make_evaluator
+from hdmm_opt.jobs.gradient import descent
+from hdmm_opt.jobs.options import Progress
+from hdmm_opt.jobs.space import Window
+from hdmm_opt.jobs.start import starting_point
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop
 from tuning import Budget, best_of, search

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from hdmm_opt import study
-from hdmm_opt.design.certify import certificate, composition
+from hdmm_opt.jobs.certify import certificate, composition
 from hdmm_opt.files.read import read
 from hdmm_opt.files.restore import restored
 from hdmm_opt.problem import GainSet, Problem, assemble

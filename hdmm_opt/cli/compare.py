@@ -13,7 +13,7 @@ from .options import ALLOW_CODE, BUDGET, JOBS, QUIET_OPTION, SEED, options_of
 from .statuses import PROVED
 
 if TYPE_CHECKING:
-    from ..design.options import Options
+    from ..jobs.options import Options
 
 
 @click.command()
@@ -31,12 +31,12 @@ def command(study: str, output: Path | None, seed: int | None, jobs: int, budget
 
 def run(name: str, output: Path | None, options: Options, allow_code: bool) -> int:
     """Tune all, run all, show the table."""
-    from ..design.compare import compare, table
-    from ..design.options import effort_of
     from ..errors import InvalidInputError
     from ..files.seal import to_text
     from ..files.sources import assumed_text
     from ..files.text import check_writable, write_text
+    from ..jobs.compare import compare, table
+    from ..jobs.options import effort_of
     from ..problem import assemble
     from ..simulation import scenarios, within_assumptions
     from .progress import bar
@@ -62,7 +62,7 @@ def run(name: str, output: Path | None, options: Options, allow_code: bool) -> i
 
 
 def _data(study: Any, found: Any) -> dict[str, Any]:
-    from ..design.compare import SCHEMA
+    from ..jobs.compare import SCHEMA
     from ..simulation.figures import plain
 
     rows = [

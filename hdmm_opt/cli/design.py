@@ -15,8 +15,8 @@ from .options import VERBOSE, options_of, work
 from .statuses import NOT_PROVED, PROVED
 
 if TYPE_CHECKING:
-    from ..design.options import Options
     from ..files.result import Design
+    from ..jobs.options import Options
     from ..study import Study
 
 NEEDED = "an actuator is exchanged in a proved file"
@@ -88,8 +88,8 @@ def _designed(
     chosen: Study, options: Options, exchange: tuple[Path, str] | None, standing: dict[str, Any] | None
 ) -> Design:
     """The design, or the machine of a proved file with another actuator."""
-    from ..design.pipeline import design
-    from ..design.replacement import replace_actuator
+    from ..jobs.pipeline import design
+    from ..jobs.replacement import replace_actuator
     from .progress import bar
 
     with bar() as progress:

@@ -26,12 +26,12 @@ def command(file: Path, budget: int, seed: int, jobs: int, resume: bool) -> None
 
 def run(path: Path, budget: int, seed: int, *, jobs: int = 1, resume: bool = False) -> int:
     """Attack a proved file, and write it with its worst run."""
-    from ..design.attack import attacked
     from ..errors import DefectError
     from ..files.read import certified_of, read
     from ..files.seal import prove, to_text
     from ..files.text import upward, write_text
     from ..files.validation import stored
+    from ..jobs.attack import attacked
     from .outputs import claimed
     from .progress import bar
 

@@ -47,6 +47,6 @@ def work(command: Any) -> Any:
 
 def options_of(jobs: int, cluster: str | None, seed: int | None, resume: bool, budget: str) -> Any:
     """The options of a job."""
-    from ..design.options import Options
+    from ..jobs.options import Options
 
     return Options(seed=seed, jobs=jobs, full=budget == "full", resume=resume, cluster=cluster)

@@ -6,8 +6,8 @@ from contextlib import AbstractContextManager
 
 import click
 
-from ..design.options import Progress
-from ..design.showing import bar as shown
+from ..jobs.options import Progress
+from ..jobs.showing import bar as shown
 from .statuses import QUIET
 
 

@@ -14,7 +14,7 @@ from .options import options_of, work
 from .statuses import PROVED
 
 if TYPE_CHECKING:
-    from ..design.options import Options
+    from ..jobs.options import Options
 
 
 @click.command()
@@ -36,9 +36,9 @@ def command(study: str, vary: tuple[str, ...], output: Path | None, allow_code: 
 
 def run(name: str, vary: tuple[str, ...], output: Path | None, options: Options, allow_code: bool) -> int:
     """Design all, write the table, show it."""
-    from ..design.sweep import SCHEMA, axis, sweep
     from ..files.seal import to_text
     from ..files.text import write_text
+    from ..jobs.sweep import SCHEMA, axis, sweep
     from .outputs import json_target
     from .progress import bar
 

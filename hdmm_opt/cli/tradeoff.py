@@ -14,7 +14,7 @@ from .options import options_of, work
 from .statuses import NOT_PROVED, PROVED
 
 if TYPE_CHECKING:
-    from ..design.options import Options
+    from ..jobs.options import Options
 
 #: Population and iterations of a quick trade-off of one member; those of the study where members are linked.
 QUICK = (32, 25)
@@ -31,12 +31,12 @@ def command(study: str, output: Path | None, allow_code: bool, **given: Any) -> 
 
 def run(name: str, output: Path | None, options: Options, allow_code: bool) -> int:
     """Search the set, write it, show it."""
-    from ..design.evaluation import OBJECTIVES
-    from ..design.options import FULL
-    from ..design.tradeoff import SCHEMA, rows, tradeoff
     from ..errors import InvalidInputError
     from ..files.seal import to_text
     from ..files.text import write_text
+    from ..jobs.evaluation import OBJECTIVES
+    from ..jobs.options import FULL
+    from ..jobs.tradeoff import SCHEMA, rows, tradeoff
     from ..problem import assemble
     from .outputs import json_target
     from .progress import bar

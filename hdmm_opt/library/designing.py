@@ -35,10 +35,10 @@ def design(
         InvalidInputError: the study cannot be made concrete.
         DefectError: a simulation left its certified envelope.
     """
-    from ..design.options import Options
-    from ..design.pipeline import design as run
-    from ..design.showing import bar
     from ..files.rejected import rejected_document
+    from ..jobs.options import Options
+    from ..jobs.pipeline import design as run
+    from ..jobs.showing import bar
 
     with bar(quiet=quiet) as progress:
         found = run(study_of(study), Options(seed=seed, jobs=jobs, full=budget == "full"), progress)
@@ -60,10 +60,10 @@ def compare(
     Raises:
         InvalidInputError: the study cannot be made concrete, or has no gains to search.
     """
-    from ..design.compare import compare as run
-    from ..design.options import Options, effort_of
-    from ..design.showing import bar
     from ..errors import InvalidInputError
+    from ..jobs.compare import compare as run
+    from ..jobs.options import Options, effort_of
+    from ..jobs.showing import bar
     from ..problem import assemble
 
     chosen, options = study_of(study), Options(seed=seed, jobs=jobs, full=budget == "full")
@@ -104,10 +104,10 @@ def sweep(
     Raises:
         InvalidInputError: a place that the study does not have, or a value that it refuses.
     """
-    from ..design.options import Options
-    from ..design.showing import bar
-    from ..design.sweep import Axis
-    from ..design.sweep import sweep as run
+    from ..jobs.options import Options
+    from ..jobs.showing import bar
+    from ..jobs.sweep import Axis
+    from ..jobs.sweep import sweep as run
 
     chosen = study_of(study)
     axes = [Axis(key=key, values=tuple(map(float, values))) for key, values in vary.items()]
@@ -138,12 +138,12 @@ def tradeoff(
     Raises:
         InvalidInputError: the study cannot be made concrete, or has no gains to search.
     """
-    from ..design.evaluation import OBJECTIVES
-    from ..design.options import Options
-    from ..design.showing import bar
-    from ..design.tradeoff import rows
-    from ..design.tradeoff import tradeoff as run
     from ..errors import InvalidInputError
+    from ..jobs.evaluation import OBJECTIVES
+    from ..jobs.options import Options
+    from ..jobs.showing import bar
+    from ..jobs.tradeoff import rows
+    from ..jobs.tradeoff import tradeoff as run
     from ..problem import assemble
 
     chosen = study_of(study)

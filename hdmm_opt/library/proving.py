@@ -75,9 +75,9 @@ def falsify(given: Given, *, budget: int = 300, seed: int = 1, jobs: int = 1, qu
         InvalidInputError: the file is not proved.
         DefectError: a run left the certified envelope.
     """
-    from ..design.attack import attacked
-    from ..design.showing import bar
     from ..errors import InvalidInputError
+    from ..jobs.attack import attacked
+    from ..jobs.showing import bar
 
     verdict = check(given)
     if not verdict.proved:

@@ -60,6 +60,9 @@ def _units(claim: Claim, units: dict[str, str]) -> None:
                 limit["unit"] == units.get(signal, amplitude),
                 f"the limit on {limit['name']} has the unit of no {signal}",
             )
+    for row in claim.rows:  # a lag carries out what is commanded
+        if row["target"] in claim.input_map:
+            need(row["unit"] == amplitude, f"the input must be in the unit of {row['state']}, {row['unit']}")
     first, second = claim.rows[0], claim.rows[1] if len(claim.rows) > 1 else None
     if claim.first == "position" and second is not None:
         need(second["unit"] == f"{first['unit']}/s", f"{second['state']} must be in {first['unit']}/s")

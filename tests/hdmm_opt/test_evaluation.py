@@ -8,18 +8,18 @@ import pytest
 from machines import emla
 
 from hdmm_opt import study
-from hdmm_opt.design.certify import contracts_of
-from hdmm_opt.design.evaluation import evaluate, make_evaluator
-from hdmm_opt.design.gradient import derivatives, descent
-from hdmm_opt.design.options import Options, Progress
-from hdmm_opt.design.search import search
-from hdmm_opt.design.space import Window
-from hdmm_opt.design.start import starting_point
-from hdmm_opt.design.tradeoff import tradeoff
-from hdmm_opt.design.validation import validate
 from hdmm_opt.errors import InvalidInputError
 from hdmm_opt.files.state import State
 from hdmm_opt.files.validation import to_data
+from hdmm_opt.jobs.certify import contracts_of
+from hdmm_opt.jobs.evaluation import evaluate, make_evaluator
+from hdmm_opt.jobs.gradient import derivatives, descent
+from hdmm_opt.jobs.options import Options, Progress
+from hdmm_opt.jobs.search import search
+from hdmm_opt.jobs.space import Window
+from hdmm_opt.jobs.start import starting_point
+from hdmm_opt.jobs.tradeoff import tradeoff
+from hdmm_opt.jobs.validation import validate
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop, Run, scenarios, within_assumptions
 from tuning import Budget

@@ -6,11 +6,11 @@ import pytest
 from hdmm_opt import study
 from hdmm_opt.cli import falsify as verb
 from hdmm_opt.cli import simulate, statuses
-from hdmm_opt.design import attack, falsification
-from hdmm_opt.design.falsification import falsify
 from hdmm_opt.errors import DefectError
 from hdmm_opt.files.read import read
 from hdmm_opt.files.result import Witness
+from hdmm_opt.jobs import attack, falsification
+from hdmm_opt.jobs.falsification import falsify
 from hdmm_opt.plants.pmsm_emla import lead_angle_tangent, transmission
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop, scenarios

@@ -8,16 +8,16 @@ import pytest
 from machines import bundled, quick_arm, serial_study, study_from
 
 from hdmm_opt.control import RAC
-from hdmm_opt.design.certify import contracts_of
-from hdmm_opt.design.compare import compare, table
-from hdmm_opt.design.options import Options, Progress
-from hdmm_opt.design.pipeline import design
-from hdmm_opt.design.replacement import replace_actuator
-from hdmm_opt.design.start import cascade
 from hdmm_opt.errors import InvalidInputError
 from hdmm_opt.files.rejected import rejected_document
 from hdmm_opt.files.restore import restored
 from hdmm_opt.files.seal import to_text
+from hdmm_opt.jobs.certify import contracts_of
+from hdmm_opt.jobs.compare import compare, table
+from hdmm_opt.jobs.options import Options, Progress
+from hdmm_opt.jobs.pipeline import design
+from hdmm_opt.jobs.replacement import replace_actuator
+from hdmm_opt.jobs.start import cascade
 from hdmm_opt.machines.crane import crane
 from hdmm_opt.motions.slices import sliced
 from hdmm_opt.problem import assemble
@@ -204,7 +204,7 @@ def test_the_bound_on_the_output_holds_at_corners(designed):
 
 
 def test_refinement_of_a_member_never_loosens_its_bound(designed):
-    from hdmm_opt.design.certify import strongest
+    from hdmm_opt.jobs.certify import strongest
 
     plain = contracts_of(designed.problem, designed.gains)
     best = strongest(designed.problem, designed.gains)

@@ -6,21 +6,21 @@ import pytest
 from machines import emla
 
 from hdmm_opt import study
-from hdmm_opt.design import pipeline
-from hdmm_opt.design.certify import contracts_of, longest_period, strongest
-from hdmm_opt.design.evaluation import make_evaluator
-from hdmm_opt.design.options import Options, Progress
-from hdmm_opt.design.refusal import diagnose
-from hdmm_opt.design.shrinking import provable_share, shrunk
-from hdmm_opt.design.space import Window
-from hdmm_opt.design.start import starting_point
-from hdmm_opt.design.validation import validate
 from hdmm_opt.errors import DefectError
 from hdmm_opt.files.gain_file import build
 from hdmm_opt.files.seal import prove
 from hdmm_opt.files.sections import short
 from hdmm_opt.files.text import write_text
 from hdmm_opt.files.validation import to_data
+from hdmm_opt.jobs import pipeline
+from hdmm_opt.jobs.certify import contracts_of, longest_period, strongest
+from hdmm_opt.jobs.evaluation import make_evaluator
+from hdmm_opt.jobs.options import Options, Progress
+from hdmm_opt.jobs.refusal import diagnose
+from hdmm_opt.jobs.shrinking import provable_share, shrunk
+from hdmm_opt.jobs.space import Window
+from hdmm_opt.jobs.start import starting_point
+from hdmm_opt.jobs.validation import validate
 from hdmm_opt.problem import assemble
 from hdmm_opt.problem.margins import violation
 from hdmm_opt.simulation import Loop, Scenario

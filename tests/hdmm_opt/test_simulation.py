@@ -7,10 +7,10 @@ from machines import emla, quick_arm, serial_study, study_from
 from scipy.integrate import solve_ivp
 
 from hdmm_opt import study
-from hdmm_opt.design.certify import sampled
-from hdmm_opt.design.start import cascade
-from hdmm_opt.design.statistics import clopper_pearson
 from hdmm_opt.errors import InvalidInputError
+from hdmm_opt.jobs.certify import sampled
+from hdmm_opt.jobs.start import cascade
+from hdmm_opt.jobs.statistics import clopper_pearson
 from hdmm_opt.machines.rigid_body import Payload, inverse_dynamics
 from hdmm_opt.machines.urdf import bodies
 from hdmm_opt.plants import pmsm_emla

@@ -10,11 +10,11 @@ from hubs import PLANT, STUDY
 from scipy.integrate import solve_ivp
 
 from hdmm_opt.cli import main
-from hdmm_opt.design.options import Options, Progress
-from hdmm_opt.design.pipeline import design
 from hdmm_opt.errors import InvalidInputError
 from hdmm_opt.files.restore import restored
 from hdmm_opt.files.seal import to_text
+from hdmm_opt.jobs.options import Options, Progress
+from hdmm_opt.jobs.pipeline import design
 from hdmm_opt.machines import registry
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop, Scenario

@@ -10,8 +10,8 @@ from importlib import resources
 import pytest
 
 from hdmm_opt import study
-from hdmm_opt.design.sweep import axis, grid, varied
 from hdmm_opt.errors import InvalidInputError
+from hdmm_opt.jobs.sweep import axis, grid, varied
 
 
 @pytest.fixture(scope="module")
