@@ -22,6 +22,8 @@ def explain(result: Design, left: Path, target: Path) -> None:
         left: What it left behind.
         target: The gain file that was not written.
     """
+    from ..files.words import plain
+
     done = result.report is not None and result.report.status == PROVED
     what = "proved, but a requirement is missed" if done else "not proved"
     _say(f"{result.problem.study.study.name}: {what}; no gain file written")
@@ -31,6 +33,8 @@ def explain(result: Design, left: Path, target: Path) -> None:
         where = f"{verdict.member}: " if verdict.member else ""
         _say(f"{verdict.verdict}: {where}{verdict.name} (margin {margin})", 2)
         _say(verdict.statement, 4)
+        if plain(verdict.name):
+            _say(f"(what must hold: {plain(verdict.name)})", 4)
         if verdict.remedy:
             _say(f"{'would pass' if verdict.sure else 'would help'}: {verdict.remedy}", 4)
         replayed = replayed or verdict.witness is not None

@@ -51,11 +51,14 @@ def arm(text: str, joints: Any, damping: float, tip: tuple[float, float, float])
     load = Payload(body=places[-1], mass=d[0], position=tip)
     forces = inverse_dynamics(tree, whole(x), whole(v), whole(a), payloads=(load,))
     rotation, origin = pose(tree, whole(x), places[-1])
+    end = origin + rotation @ ca.DM(tip)
+    joints = [pose(tree, whole(x), k)[1] for k in places]
     return Machine(
         name="arm", members=names, plants=tuple(plants),
         disturbances=(Disturbance(name="payload", unit="kg", course="constant"),),
         forces=ca.Function("forces", [x, v, a, d], [ca.vertcat(*(forces[k] for k in places))]),
-        place=ca.Function("place", [x], [origin + rotation @ ca.DM(tip)]), planner="joints",
+        place=ca.Function("place", [x], [end]), planner="joints",
+        sticks=ca.Function("sticks", [x], [ca.horzcat(ca.SX.zeros(3), *joints, end)]),
         coordinates=("x", "y", "z"),
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from ..names import nearest
 from ..plants import Parameter, defaults, pmsm_emla
 from ..plants.pmsm_emla import ratings
 from .crane_dynamics import JOINTS, joints_of, rod_forces, strokes
-from .crane_geometry import LIFT, TELESCOPE, TILT, tool
+from .crane_geometry import LIFT, TELESCOPE, TILT, figure, tool
 from .machine import Disturbance, Machine
 from .model import Model, Numbers, check_numbers, check_parameters, given, no_place, numbers_of
 
@@ -58,6 +58,7 @@ def crane(
         disturbances=(Disturbance(name="payload", unit="kg", course="constant"),),
         forces=ca.Function("forces", [x, v, a, d], [ca.vertcat(*(forces[k] for k in kept))]),
         place=ca.Function("place", [x], [place]), planner="crane", coordinates=("x", "z"),
+        sticks=ca.Function("sticks", [x], [figure(joints_of(whole(x, still=False)))]),
         of_joints=ca.Function("strokes", [x], [ca.vertcat(*(turned[k] for k in kept))]),
     )  # fmt: skip
 

@@ -135,6 +135,18 @@ def tool(w: Any) -> tuple[Any, Any]:
     return across, up
 
 
+def figure(w: Any) -> Any:
+    """Points of the crane as sticks, m, at joint coordinates: ground, lift, tilt, corner, tool. Shape (3, 5)."""
+    import casadi as ca
+
+    c1, s1 = ca.cos(w[0]), ca.sin(w[0])
+    elbow = BASE[0] + ELBOW[0] * c1 - ELBOW[1] * s1, BASE[1] + ELBOW[0] * s1 + ELBOW[1] * c1
+    c12, s12 = ca.cos(w[0] + w[1]), ca.sin(w[0] + w[1])
+    corner = elbow[0] - TOOL[1] * s12, elbow[1] + TOOL[1] * c12
+    points = ((BASE[0], 0.0), BASE, elbow, corner, tool(w))
+    return ca.horzcat(*(ca.vertcat(across, 0, up) for across, up in points))
+
+
 def apart(w: Any, place: Sequence[float]) -> float:
     """Distance of the tool from a place at joint coordinates, m."""
     return math.hypot(*(float(is_at) - float(there) for is_at, there in zip(tool(w), place, strict=True)))

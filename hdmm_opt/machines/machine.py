@@ -52,6 +52,7 @@ class Machine:
         assumed: What has no public source, beside the parameters that say so.
         coordinates: Names of the output's coordinates.
         of_joints: CasADi function joint coordinates -> the members' first states; None where they are the same.
+        sticks: CasADi function of the members' first states -> points of a stick figure, m. Shape (3, k).
         bundled: Numbers of each member that the study leaves to the bundled machine.
     """
 
@@ -65,6 +66,7 @@ class Machine:
     assumed: tuple[str, ...] = ()
     coordinates: tuple[str, ...] = ("",)
     of_joints: Any = None
+    sticks: Any = None
     bundled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
