@@ -24,7 +24,12 @@ NEEDED = "an actuator is exchanged in a proved file"
 
 @click.command()
 @click.argument("study")
-@click.option("-o", "output", type=click.Path(path_type=Path), help="Gain file to write; STUDY.gains.json by default.")
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(path_type=Path),
+    help="Gain file; NAME.gains.json by default.",
+)
 @click.option("--report", type=click.Path(path_type=Path, file_okay=False), help="Folder for an HTML report.")
 @click.option(
     "--exchange",

@@ -87,7 +87,7 @@ def proved(result: Design, *, verbose: bool = False) -> None:
     for name, entry in document["study"]["uncertainty"]["disturbances"].items():
         low, high = entry["range"]
         _say(f"for {name} from {low:g} to {high:g} {entry['unit']}", 2)
-    for line in (*_pinned(result), *result.notes):
+    for line in (*_pinned(result), *_rated(result), *(result.notes if verbose else result.notes[-1:])):
         _say(line, 2)
     _sources(result)
     if verbose:
@@ -97,11 +97,11 @@ def proved(result: Design, *, verbose: bool = False) -> None:
 
 def _sources(result: Design) -> None:
     """What the study left to the bundled machine, and what is assumed."""
-    from ..files.sources import assumed_text, bundled_text
+    from ..files.sources import assumed_text, bundled_text, exact_text
 
-    left = bundled_text(result.problem)
-    if left:
-        _say(left, 2)
+    for text in (exact_text(result.problem), bundled_text(result.problem)):
+        if text:
+            _say(text, 2)
     _say(f"assumed, to be replaced by yours: {assumed_text(result.problem)}", 2)
 
 
@@ -156,6 +156,27 @@ def _pinned(result: Design) -> list[str]:
     return [f"at an end of their range, which may be too narrow: {', '.join(found)}"] if found else []
 
 
+def _rated(result: Design) -> list[str]:
+    """Ratings of the motor that a simulated run passed: they bind nothing in the proof."""
+    assert result.shown is not None
+    found = {}
+    for member in result.problem.members:
+        for name, group, output in RATED:
+            rating = member.plant.ratings.get(name)
+            if rating is None or output not in member.plant.outputs:
+                continue
+            seen = max((getattr(m.members[member.name], group)[output] for m in result.shown.inside), default=0.0)
+            if seen > rating.value:
+                where = f"{member.name} " if len(result.problem.members) > 1 else ""
+                found[where + name] = f"{where}{name} {rating.value:.4g} {rating.unit}: simulated {seen:.4g}"
+    return [f"above a rating, which the proof does not know: {'; '.join(found.values())}"] if found else []
+
+
+#: Ratings that simulated runs are compared with: name, figures, output.
+RATED = (
+    ("rated_torque", "rms", "torque"), ("rated_current", "rms", "current"), ("peak_current", "peaks", "current"),
+    ("peak_torque", "peaks", "torque"),
+)  # fmt: skip
 #: A gain this close to an end of its range, relatively, is at it.
 PINNED = 0.005
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import click
 
+from ..names import nearest
 from .inputs import INPUT
 from .statuses import INTERRUPTED, MISUSE, NOT_PROVED
 
@@ -36,6 +37,27 @@ class _Group(click.Group):
         if cmd_name not in VERBS:
             return None
         return import_module(f"{__package__}.{cmd_name}").command
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run a verb; misuse of the command line is one line too."""
+        try:
+            status = super().main(*args, **{**kwargs, "standalone_mode": False})
+        except click.UsageError as error:
+            verb = error.ctx.info_name if error.ctx is not None and error.ctx.command is not self else None
+            where = f"hdmm-opt {verb}" if verb else "hdmm-opt"
+            click.echo(f"hdmm-opt: {error.format_message().rstrip('.')}; see {where} --help", err=True)
+            sys.exit(MISUSE)
+        except click.ClickException as error:
+            click.echo(f"hdmm-opt: {error.format_message()}", err=True)
+            sys.exit(MISUSE)
+        except click.Abort:
+            sys.exit(INTERRUPTED)
+        sys.exit(status if isinstance(status, int) else 0)
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        if args and args[0] not in VERBS and not args[0].startswith("-"):
+            raise click.UsageError(f'no verb is named "{args[0]}", {nearest(args[0], VERBS)}', ctx)
+        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         from ..errors import DefectError, InvalidInputError

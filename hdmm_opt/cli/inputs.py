@@ -41,4 +41,6 @@ def must_be_proved(path: Path, why: str) -> None:
 
     report = checker.check_file(path)
     if report.status != PROVED:
-        raise InvalidInputError(f"{path}: {report.message}; {why}")
+        refused = "hdmm-opt/rejected" in report.message
+        what = "a refused design left it, and nothing is proved" if refused else report.message
+        raise InvalidInputError(f"{path}: {what}; {why}")

@@ -9,10 +9,14 @@ import click
 
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def command(as_json: bool) -> None:
+@click.option("--show", metavar="NAME", help="Print the file of a bundled study, to begin your own from.")
+def command(as_json: bool, show: str | None) -> None:
     """List the bundled studies: name, machine, law, what it shows."""
-    from ..study.read import bundled
+    from ..study.read import bundled, bundled_text
 
+    if show is not None:
+        click.echo(bundled_text(show), nl=False)
+        return
     rows = [row(name) for name in bundled()]
     if as_json:
         click.echo(json.dumps(rows, indent=1))

@@ -39,7 +39,7 @@ def check_report() -> None:
 
         _ = jinja2, plotly
     except ImportError:
-        raise InvalidInputError('a report needs the extra "report": pip install "hdmm-opt[report]"') from None
+        raise InvalidInputError("a report needs jinja2 and plotly: pip install jinja2 plotly") from None
 
 
 def write_report(document: Mapping[str, Any], folder: Path) -> Path:

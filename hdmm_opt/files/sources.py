@@ -34,6 +34,21 @@ def bundled_text(problem: Problem) -> str:
     return f"still {'the defaults of' if own_name(model) else 'of the bundled'} {model}: {_listed(problem, left)}"
 
 
+def exact_text(problem: Problem) -> str:
+    """Measurements and starts that a study takes as exact, in one line; empty where there are none."""
+    parts = []
+    for kind, what in (("noise", "measured"), ("initial", "at the start")):
+        names = {
+            state for m in problem.members
+            for state, value in zip(m.plant.states, getattr(m.bounds, kind), strict=True) if value == 0
+        }  # fmt: skip
+        ordered = [
+            state for state in dict.fromkeys(s for m in problem.members for s in m.plant.states) if state in names
+        ]
+        parts += [f"{', '.join(ordered)} {what}"] if ordered else []
+    return f"taken as exact, because the study gives no error: {'; '.join(parts)}" if parts else ""
+
+
 def _listed(problem: Problem, names: Iterable[str]) -> str:
     members: dict[str, list[str]] = {}
     for name in names:

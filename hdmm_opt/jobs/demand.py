@@ -28,6 +28,23 @@ def largest_demand(problem: Problem, gains: GainSet, name: str) -> tuple[float, 
     return demands[worst], found[worst]
 
 
+def resting_demand(member: Member) -> float | None:
+    """What holds the largest load at rest at nominal parameters, in the unit of the input; None where it is another."""
+    import casadi as ca
+
+    plant, row = member.plant, member.plant.accelerating
+    following = [j for j, target in enumerate(plant.targets) if target == row]
+    unit = plant.state_units[following[0]] if following else plant.input_unit
+    if unit != plant.limits[0].unit:
+        return None
+    loads = [max(member.bounds.disturbances[name].low, member.bounds.disturbances[name].high, key=abs)
+             for name in plant.disturbances]  # fmt: skip
+    rest = ca.DM([sum(plant.stroke) / 2 if plant.first == "position" else 0.0, *[0.0] * (len(plant.states) - 1)])
+    values = ca.DM([p.value for p in plant.parameters.values()])
+    held = plant.demand(row, 0.0, x=ca.SX(rest), w=ca.SX(loads), p=ca.SX(values))
+    return abs(float(ca.evalf(ca.SX(held))))
+
+
 def terms_that_help(problem: Problem, gains: GainSet, member: Member) -> str:
     """The fewest electrical modelling terms that bring the demand inside the limit, as advice."""
     limit, given = member.plant.limits[0], problem.study.controller.modelling

@@ -118,5 +118,5 @@ def finished(
 def _rates(problem: Problem, tuned: Tuned) -> str:
     own, longest = problem.period, longest_period(problem, tuned.gains)
     if not longest > own:
-        return f"proved at a control period of {own * 1e3:.4g} ms ({1 / own:.4g} Hz); no longer one was found"
-    return f"certified up to a control period of {longest * 1e3:.4g} ms ({1 / longest:.4g} Hz), not found beyond"
+        return f"with these gains no control rate below {1 / own:.4g} Hz was found at which it is proved"
+    return f"with these gains a control rate down to {1 / longest:.4g} Hz ({longest * 1e3:.4g} ms) is proved too"

@@ -19,7 +19,7 @@ from ..problem.problem import Contracts
 from ..problem.verdict import Verdict
 from ..simulation import Figures, Loop, Run, Scenario, scenarios, within_assumptions
 from .certify import certificate, longest_period
-from .demand import demand_period, largest_demand, terms_that_help
+from .demand import demand_period, largest_demand, resting_demand, terms_that_help
 from .shrinking import uncertainty
 from .validation import shown_scenarios
 
@@ -120,9 +120,22 @@ def _authority(problem: Problem, member: Member, gains: GainSet, continuous: Cer
 
 
 def _less_demand(member: Member, excess: float, unit: str) -> str:
+    held = resting_demand(member)
+    if held is not None and held > member.plant.limits[0].value:
+        limit = member.plant.limits[0]
+        return (
+            f"the largest load alone asks for {held:.4g} {limit.unit} at rest: a limit on {limit.name} above that, a "
+            "smaller load, or another transmission"
+        )
     known = "mechanics" in getattr(member.law, "modelling", ())
     hint = "" if known else ', or the modelling term "mechanics"'
     return f"lower the demand by {excess:.4g} {unit}: a slower reference, a smaller load range, smaller gains{hint}"
+
+
+def _apart(row: int | None) -> str:
+    return (
+        "bandwidths further apart (a larger gain in that row, or a smaller one before it), " if row else "other gains, "
+    )
 
 
 def _conditions(problem: Problem, member: Member, continuous: Certificate | Failure) -> list[Verdict]:
@@ -136,8 +149,8 @@ def _conditions(problem: Problem, member: Member, continuous: Certificate | Fail
                 margin=continuous.margin,
                 unit="1/s",
                 verdict="undecided",
-                remedy="separate the bandwidths (a larger gain in that row or a smaller one before it), add a "
-                "modelling term for that row, or narrow the tolerances and the noise that enter it",
+                remedy=f"{_apart(row)}a faster control rate, a modelling term for that row, or narrower tolerances and "
+                "noise that enter it",
             )
         ]
     error = member_margins(member, continuous, shown=False)[-1]

@@ -83,7 +83,7 @@ def uncertainty(problem: Problem, gains: GainSet) -> Verdict:
         remedy = f"{what} at {100 * share:.3g} %"
         alone = {} if problem.linked else {kind: provable_share(problem, gains, (kind,), COARSE) for kind in KINDS}
         found = [f"{KINDS[kind]} at {100 * part:.3g} %" for kind, part in alone.items() if part > 0]
-        remedy += f"; or alone {', or '.join(found)}" if found else ""
+        remedy += f"; or with these gains alone {', or '.join(found)}" if found else ""
     return Verdict(
         name="uncertainty", statement=statement, margin=share - 1.0, unit="share", verdict="undecided",
         remedy=remedy, sure=share > 0.0,

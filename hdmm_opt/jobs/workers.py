@@ -29,7 +29,7 @@ def workers(make: Make, arguments: tuple[Any, ...], jobs: int, cluster: str | No
         return executor(_with_code, (allowed(), make, arguments), jobs, cluster)
     except ImportError:
         raise InvalidInputError(
-            '--cluster needs Dask, which is not installed; pip install "hdmm-opt[cluster]", or leave it out'
+            '--cluster needs Dask, which is not installed; pip install "dask[distributed]", or leave it out'
         ) from None
     except (OSError, ValueError) as error:
         if cluster is None:

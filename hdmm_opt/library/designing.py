@@ -4,14 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from ..study import Study
 from .records import Designed, Table
 from .studies import study_of
 from .threads import alone
 
+if TYPE_CHECKING:
+    from ..jobs.options import Options
+
 Budget = Literal["quick", "full"]
+
+
+def _options(seed: int | None, jobs: int, budget: str) -> Options:
+    from ..errors import InvalidInputError
+    from ..jobs.options import Options
+
+    if budget not in ("quick", "full") or not isinstance(jobs, int) or jobs < 1:
+        raise InvalidInputError(
+            f'budget is "quick" or "full", jobs a whole number of at least 1: got {budget!r}, {jobs!r}; correct them'
+        )
+    return Options(seed=seed, jobs=jobs, full=budget == "full")
 
 
 @alone
@@ -36,12 +50,11 @@ def design(
         DefectError: a simulation left its certified envelope.
     """
     from ..files.rejected import rejected_document
-    from ..jobs.options import Options
     from ..jobs.pipeline import design as run
     from ..jobs.showing import bar
 
     with bar(quiet=quiet) as progress:
-        found = run(study_of(study), Options(seed=seed, jobs=jobs, full=budget == "full"), progress)
+        found = run(study_of(study), _options(seed, jobs, budget), progress)
     if found.document is not None and found.report is not None:
         return Designed(document=found.document, message=found.report.message, notes=found.notes)
     failures = tuple(
@@ -62,11 +75,11 @@ def compare(
     """
     from ..errors import InvalidInputError
     from ..jobs.compare import compare as run
-    from ..jobs.options import Options, effort_of
+    from ..jobs.options import effort_of
     from ..jobs.showing import bar
     from ..problem import assemble
 
-    chosen, options = study_of(study), Options(seed=seed, jobs=jobs, full=budget == "full")
+    chosen, options = study_of(study), _options(seed, jobs, budget)
     problem, effort = assemble(chosen), effort_of(chosen, options)
     if not problem.searched:
         raise InvalidInputError(f"{chosen.study.name}: a comparison needs gains to search; give one min and max")
@@ -104,7 +117,6 @@ def sweep(
     Raises:
         InvalidInputError: a place that the study does not have, or a value that it refuses.
     """
-    from ..jobs.options import Options
     from ..jobs.showing import bar
     from ..jobs.sweep import Axis
     from ..jobs.sweep import sweep as run
@@ -112,7 +124,7 @@ def sweep(
     chosen = study_of(study)
     axes = [Axis(key=key, values=tuple(map(float, values))) for key, values in vary.items()]
     with bar(quiet=quiet) as progress:
-        rows, _ = run(chosen, axes, Options(seed=seed, jobs=jobs, full=budget == "full"), progress)
+        rows, _ = run(chosen, axes, _options(seed, jobs, budget), progress)
     heads = (*vary, "verdict", "certified error [m]", "simulated error [m]")
     values = tuple(
         (*row["values"].values(), row["verdict"], row["certified_error_m"], row["simulated_error_m"]) for row in rows

@@ -81,7 +81,13 @@ def falsify(given: Given, *, budget: int = 300, seed: int = 1, jobs: int = 1, qu
 
     verdict = check(given)
     if not verdict.proved:
-        raise InvalidInputError(f"{verdict.verdict.message}; only a proved file can be attacked")
+        raise InvalidInputError(
+            f"{verdict.verdict.file}: {verdict.verdict.message}; only a proved file can be attacked"
+        )
+    if not isinstance(budget, int) or budget < 1 or not isinstance(jobs, int) or jobs < 1:
+        raise InvalidInputError(
+            f"budget and jobs are whole numbers of at least 1: got {budget!r}, {jobs!r}; correct them"
+        )
     document = document_of(given)
     with bar(quiet=quiet) as progress:
         problem, found = attacked(document, budget, seed, progress, jobs=jobs)

@@ -47,7 +47,7 @@ class Designed:
         notes: What is told beside a proof.
     """
 
-    document: Mapping[str, Any]
+    document: Mapping[str, Any] = field(repr=False)
     message: str
     failures: tuple[tuple[str, str, str], ...] = ()
     notes: tuple[str, ...] = ()

@@ -81,6 +81,11 @@ class Numbers:
             return self.bundled
         unasked = {EFFECTIVENESS, *([plant.carried] if coupled else [])}
         found = [name for name in plant.parameters if name not in self.parameters and name not in unasked]
+        found += [
+            f"{name} tolerance"
+            for name, entry in self.parameters.items()
+            if name in plant.parameters and entry.tolerance is None and plant.parameters[name].tolerance > 0
+        ]
         found += [name for name in plant.ratings if name not in self.ratings]
         found += [f"{limit.name} limit" for limit in plant.limits if limit.name not in self.limits]
         return (*found, *(() if self.stroke else ("stroke",)))

@@ -166,5 +166,7 @@ def effort_table(study: Study, plant: Plant, reference: Reference) -> list[dict[
         peak, first = float(max(values[k] for k in own)), own[0]
         assert math.isfinite(peak)
         name, unit = plant.efforts.names[first], plant.efforts.units[first]
-        rows.append({"quantity": name, "unit": unit, "peak": peak, "limit": getattr(limits, key)})
+        given = getattr(limits, key)
+        drive = next((limit.value for limit in plant.limits if limit.name == name and limit.unit == unit), None)
+        rows.append({"quantity": name, "unit": unit, "peak": peak, "limit": drive if given is None else given})
     return rows

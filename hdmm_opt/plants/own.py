@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from importlib import util
 from pathlib import Path
+from typing import Any
 
 from ..errors import InvalidInputError
+from .parameter import Parameter
+from .plant import Plant
 from .registry import PlantModel
-from .sound import check_plant
+from .sound import check_parameters, check_plant
 
 _NAME = re.compile(r"(?P<file>[^:]+\.py):(?P<function>[A-Za-z_][A-Za-z0-9_]{0,63})")
 #: What was allowed to run, by name in a study: the file, and what its function gave.
@@ -56,33 +58,51 @@ def allow(name: str, folder: Path, *, known_as: str | None = None) -> None:
     if match is None:
         raise InvalidInputError(f'plant.model of your own is "FILE.py:FUNCTION": got {name[:80]!r}; correct it')
     file = (folder / match["file"]).resolve()
-    try:
-        made = _function(file, match["function"])()
-    except InvalidInputError:
-        raise
-    except Exception as error:
-        raise InvalidInputError(
-            f"plant.model: {match['file']} fails: {type(error).__name__}: {_line(error)}; correct the file"
-        ) from None
+    if not file.is_file():
+        raise InvalidInputError(f"plant.model: there is no file {file.name} beside the study; correct the path")
+    found = _tried(lambda: _function(file, match["function"]), match["file"])
+    if found is None:
+        raise InvalidInputError(f'plant.model: {file.name} has no function "{match["function"]}"; correct the name')
+    made = _tried(found, match["file"])
     if not isinstance(made, PlantModel):
         raise InvalidInputError(
             f"plant.model: {match['function']}() must return a PlantModel: got {type(made).__name__}; "
             "see docs/own_machine.md"
         )
-    _ALLOWED[known_as or name] = (file, replace(made, build=lambda *given: check_plant(made.build(*given))))
+    _ALLOWED[known_as or name] = (file, _guarded(made, match["file"]))
 
 
-def _function(file: Path, function: str) -> Callable[[], object]:
-    if not file.is_file():
-        raise InvalidInputError(f"plant.model: there is no file {file.name} beside the study; correct the path")
+def _guarded(made: PlantModel, file: str) -> PlantModel:
+    """The plant model, with what its functions raise as one line and what they return looked at."""
+
+    def defaults(level: str) -> dict[str, Parameter]:
+        return check_parameters(_tried(lambda: made.defaults(level), file))
+
+    def ratings(level: str) -> dict[str, Parameter]:
+        return check_parameters(_tried(lambda: made.ratings(level), file))
+
+    def build(level: str, parameters: Mapping[str, Parameter], ratings: Mapping[str, Parameter]) -> Plant:
+        return check_plant(_tried(lambda: made.build(level, parameters, ratings), file))
+
+    return PlantModel(levels=made.levels, defaults=defaults, build=build, ratings=ratings)
+
+
+def _tried(function: Callable[[], Any], file: str) -> Any:
+    try:
+        return function()
+    except Exception as error:
+        raise InvalidInputError(
+            f"plant.model: {file} fails: {type(error).__name__}: {_line(error)}; correct the file"
+        ) from None
+
+
+def _function(file: Path, function: str) -> Callable[[], object] | None:
     spec = util.spec_from_file_location(f"hdmm_opt_own_{file.stem}", file)
     assert spec is not None and spec.loader is not None
     module = util.module_from_spec(spec)
     spec.loader.exec_module(module)
     found = getattr(module, function, None)
-    if not callable(found):
-        raise InvalidInputError(f'plant.model: {file.name} has no function "{function}"; correct the name')
-    return found
+    return found if callable(found) else None
 
 
 def _line(error: Exception) -> str:

@@ -69,6 +69,20 @@ _MOTOR = {
     "resistance": Parameter(value=0.08, unit="ohm", tolerance=0.2, source="table", meaning="phase resistance"),
     "inductance": Parameter(value=0.00242, unit="H", tolerance=0.05, source="table", meaning="phase inductance"),
 }  # fmt: skip
+_RATED = {
+    "rated_torque": Parameter(
+        value=37.1, unit="N m", source="derived", meaning="torque that it may deliver all the time"
+    ),
+    "rated_current": Parameter(
+        value=23.1 * math.sqrt(2.0),
+        unit="A",
+        source="table",
+        meaning="current that it may carry all the time, amplitude",
+    ),
+    "peak_current": Parameter(
+        value=48.2 * math.sqrt(2.0), unit="A", source="table", meaning="largest current, amplitude"
+    ),
+}
 _PEAK = {"peak_torque": Parameter(value=77.0, unit="N m", source="table", meaning="largest torque of the motor")}
 #: Peaks of the bundled motor, for limits that a study does not give.
 _SPEED = 3877.0 / 60.0 * 0.016 / 7.7
@@ -100,7 +114,8 @@ def defaults(level: str) -> dict[str, Parameter]:
 
 def ratings(level: str) -> dict[str, Parameter]:
     """Numbers of the motor that the equations of a level do not read; its currents and voltages follow from them."""
-    return dict(_MOTOR) if level == "torque" else dict(_PEAK)
+    rated = {name: _RATED[name] for name in ("rated_torque", "rated_current")}
+    return {**_MOTOR, **_RATED} if level == "torque" else {**_PEAK, **rated}
 
 
 def transmission(values: Mapping[str, Any]) -> Any:

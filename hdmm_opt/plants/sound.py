@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
 from ..errors import InvalidInputError
+from .parameter import SOURCES, Parameter
 from .plant import Plant
 
+#: Operations that the prover and the checker bound in a plant, as users know them.
+BOUNDED = ("add", "sub", "mul", "div", "neg", "sq", "sqrt", "tanh", "input", "const")
+_UNIT = re.compile(r"1|[A-Za-z]{1,4}(\^[2-4])?( [A-Za-z]{1,4}(\^[2-4])?){0,3}(/[A-Za-z]{1,4}(\^[2-4])?)?")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 #: Units of a first state.
 FIRST = {"position": ("m", "rad"), "speed": ("m/s", "rad/s")}
@@ -40,13 +45,83 @@ def check_plant(plant: Any) -> Plant:
         raise _wrong(f"a first {plant.first} must be in {wanted}: got {plant.state_units[0]!r:.20}", "convert it")
     _check_rows(plant)
     _check_symbols(plant)
+    _check_limits(plant)
+    _check_operations(plant)
+    check_parameters(plant.parameters)
+    return plant
+
+
+def check_parameters(parameters: Any) -> dict[str, Parameter]:
+    """Parameters by name, each with a finite value, a unit, a tolerance below one and a source.
+
+    Raises:
+        InvalidInputError: the first that is not so.
+    """
+    if not isinstance(parameters, dict):
+        raise _wrong(f"parameters are a dict by name: got {type(parameters).__name__}", "return one")
+    for name, p in parameters.items():
+        if not isinstance(p, Parameter):
+            raise _wrong(f"{name} must be a Parameter: got {type(p).__name__}", "make it one")
+        if not math.isfinite(p.value) or not 0 <= p.tolerance < 1:
+            rule = f"{name} needs a finite value and a tolerance from 0 to below 1: got {p.value:g}, {p.tolerance:g}"
+            raise _wrong(rule, "correct it")
+        _check_tags(name, p.unit, p.source)
+    return parameters
+
+
+def _check_tags(name: str, unit: str, source: str) -> None:
+    if not isinstance(unit, str) or _UNIT.fullmatch(unit) is None:
+        raise _wrong(f'{name} needs a unit such as "kg m^2", "N m s/rad" or "1": got {unit!r:.20}', "correct it")
+    if source not in SOURCES:
+        raise _wrong(f"{name} needs a source, one of {', '.join(SOURCES)}: got {source!r:.20}", "choose one")
+
+
+def _check_limits(plant: Plant) -> None:
     if not plant.limits or set(plant.limits[0].signals) != set(plant.inputs):
         raise _wrong("the first limit must be the amplitude limit of all inputs", "put it first")
-    known = {*plant.states, *plant.inputs}
+    units = dict(zip(plant.states, plant.state_units, strict=True)) | dict.fromkeys(plant.inputs, plant.input_unit)
     for limit in plant.limits:
-        if not set(limit.signals) <= known or not limit.value > 0:
+        if not set(limit.signals) <= set(units) or not limit.value > 0:
             raise _wrong(f"limit {limit.name} must be above 0 and about states or inputs", "correct it")
-    return plant
+        _check_tags(f"limit {limit.name}", limit.unit, limit.source)
+        for signal in limit.signals:
+            if limit.unit != units[signal]:
+                rule = f"limit {limit.name} must be in the unit of {signal}, {units[signal]}: got {limit.unit}"
+                raise _wrong(rule, "convert it")
+    for state, unit, target in zip(plant.states, plant.state_units, plant.targets, strict=True):
+        if target in plant.input_map and unit != plant.input_unit:
+            raise _wrong(f"{state} carries out the input and must be in {plant.input_unit}: got {unit}", "convert it")
+
+
+def _check_operations(plant: Plant) -> None:
+    """Nothing that the prover cannot bound, everything stated is read, and every input moves something."""
+    import casadi as ca
+
+    from stability.enclosures.translation import straight_line
+
+    inputs = ca.vertcat(plant.x, plant.u, plant.w, plant.p)
+    names = (*plant.states, *plant.inputs, *plant.disturbances, *plant.parameters)
+    try:
+        program = straight_line(
+            ca.Function("plant", [inputs], [ca.densify(ca.vertcat(plant.mass, plant.force))]), names
+        )
+        other = sorted({operator for operator, *_ in program.operations} - set(BOUNDED))
+    except NotImplementedError:
+        other = ["an operation"]
+    if other:
+        raise _wrong(
+            f"the prover bounds + - * / squares, square roots and tanh: got {other[0]}", "rewrite it with those"
+        )
+    unread = [name for name in (*plant.disturbances, *plant.parameters) if name not in program.inputs]
+    if unread:
+        raise _wrong(f"the equations do not use {unread[0]}", "remove it, or put it into ratings")
+    for name, symbol in zip(plant.inputs, ca.vertsplit(plant.u) if plant.inputs else [], strict=True):
+        if not ca.depends_on(plant.force, symbol):
+            raise _wrong(f"input {name} moves nothing", "put it into force")
+    masses = ca.Function("mass", [plant.p], [plant.mass])(list(plant.values().values()))
+    for state, mass in zip(plant.states, ca.vertsplit(ca.densify(masses)), strict=True):
+        if not float(mass) > 0:
+            raise _wrong(f"the mass of row {state} must be positive: got {float(mass):g}", "correct it")
 
 
 def _check_rows(plant: Plant) -> None:

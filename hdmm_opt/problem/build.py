@@ -66,6 +66,7 @@ def assemble(study: Study, references: tuple[Reference, ...] | None = None) -> P
         machine = machine.carrying(_carried(machine, slices, [spans[d.name].high for d in machine.disturbances]))
     loads = machine.loads(spans)
     foreseen = loads.feedforward(slices) if loads is not None else None
+    _check_motion(machine, references)
     observers = _observers(study, machine)
     members = []
     for k, (name, plant) in enumerate(zip(machine.members, machine.plants, strict=True)):
@@ -143,6 +144,22 @@ def _check_rates(study: Study, machine: Machine) -> None:
                 f"controller.rates_hz.{name} must divide the fastest rate, {fastest:g} Hz: got {rate:g}; "
                 f"{fastest / round(fastest / rate):g} would do"
             )
+
+
+def _check_motion(machine: Machine, references: tuple[Reference, ...]) -> None:
+    """No reference passes by itself what limits the rate of a first state."""
+    for name, plant, reference in zip(machine.members, machine.plants, references, strict=True):
+        if plant.first != "position" or len(plant.states) < 2:
+            continue
+        low, high = reference.bounds()[1]
+        for limit in plant.limits:
+            peak = max(-low, high)
+            if limit.signals == (plant.states[1],) and not peak < limit.value:
+                where = f"{name}: " if len(machine.members) > 1 else ""
+                raise InvalidInputError(
+                    f"reference: {where}its {limit.name} reaches {peak:.4g} {limit.unit}, the limit of the plant is "
+                    f"{limit.value:.4g} {limit.unit}; allow more time or raise the limit"
+                )
 
 
 def state_key(plant: Plant, state: str) -> str:

@@ -129,6 +129,6 @@ def _member(part: Part, found: Mapping[str, float], gone: bool, ticks: int, late
         peak_input=found[f"input {name}"],
         peaks={key: found[f"peak {key} {name}"] for key in outputs},
         rms={key: math.sqrt(found[f"squares {key} {name}"] / ticks) for key in outputs},
-        energy_j=found.get(f"sum power {name}", 0.0) * period,
+        energy_j=found.get(f"sum power {name}", math.nan) * period,
         estimates=tuple(watched),
     )

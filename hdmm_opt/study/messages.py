@@ -43,6 +43,10 @@ def one_line(error: ValidationError, whole: type[BaseModel]) -> str:
         return f"{path} must be {context.get('expected', 'a known word')}: got {shown}; choose one"
     if kind == "too_short":
         return f"{path} must have at least {context.get('min_length', 1)} entries: got {shown}; add what is missing"
+    if kind == "model_type" and place[0] == "plant":
+        return f"{path} must be a section: got {shown}; give value, unit and source"
+    if kind == "too_long":
+        return f"{path} must have at most {context.get('max_length')} entries: got {shown}; remove what is too much"
     if kind == "model_type":
         return f"{path} must be a section: got {shown}; a fixed number is {{ value = {shown} }}"
     if kind == "tuple_type":

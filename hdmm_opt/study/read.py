@@ -28,6 +28,17 @@ def bundled() -> list[str]:
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
+def bundled_text(name: str) -> str:
+    """The file of a bundled study.
+
+    Raises:
+        InvalidInputError: there is none of that name.
+    """
+    if name not in bundled():
+        raise InvalidInputError(f'no bundled study is named "{name}"; {nearest(name, bundled())}')
+    return (resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8")
+
+
 def load(name: str, *, allow_code: bool = False) -> Study:
     """Read a study of a design.
 
@@ -52,7 +63,7 @@ def load(name: str, *, allow_code: bool = False) -> Study:
 def load_any(name: str, *, allow_code: bool = False) -> Study | MotionStudy:
     """Read a study of a design, or of a motion alone; as `load`."""
     if name in bundled():
-        return parse((resources.files("hdmm_opt") / "studies" / f"{name}.toml").read_text(encoding="utf-8"), name)
+        return parse(bundled_text(name), name)
     path = Path(name)
     if path.suffix != ".toml" and not path.exists():
         raise InvalidInputError(
@@ -61,8 +72,9 @@ def load_any(name: str, *, allow_code: bool = False) -> Study | MotionStudy:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
-        raise InvalidInputError(f"{path}: cannot read the study file: {reason}; check the path") from None
+        if isinstance(error, UnicodeDecodeError):
+            raise InvalidInputError(f"{path}: not UTF-8 text; save it as UTF-8") from None
+        raise InvalidInputError(f"{path}: cannot read the study file: {error.strerror}; check the path") from None
     return parse(text, str(path), allow_code=allow_code, folder=path.parent)
 
 

@@ -93,6 +93,7 @@ def square(a: Interval) -> Interval:
 
 def root(x: Fraction, upwards: bool) -> Fraction:
     """A rational bound on the square root."""
+    WORK.one(4)
     if x < 0:
         raise NotProvedError("a square root of a negative number in the assumed box")
     shift = 2 * max(0, BITS - (x.numerator.bit_length() - x.denominator.bit_length()) // 2)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import io
 import json
+import os
+import stat
 import sys
 import textwrap
 from dataclasses import replace
@@ -25,7 +28,7 @@ from .limits import (
     need,
 )
 from .member import Member, check_member
-from .obligation import Obligation, Report, downward, milli, percent
+from .obligation import Obligation, Report, downward, milli, percent, upward
 from .observer import observed
 from .parsing import check_digests, number, parse, wrong_schema
 from .shape import shaped
@@ -90,7 +93,8 @@ def check_machine(data: dict[str, Any], file: str) -> Report:
         ("uncertainty.initial", study["uncertainty"].get("initial", {}), states),
     ):
         need(set(given) <= known, f"the study's {where} names something that the file does not have")
-    need(not study["plant"].get("parameters"), "a parameter of the study stands with the member that has it")
+    need(list(study["plant"]["joints"]) == names, "the members stand in another order than in the study")
+    need(not set(study["plant"]["locked"]) & set(names), "a member that moves is not locked")
     couplings = data["couplings"]
     need(isinstance(couplings, list) and len(couplings) <= 1, "a machine has one coupling, or none")
     need(all(entry["members"] == names for entry in couplings), "a coupling is of all members in their order")
@@ -130,12 +134,12 @@ def check_together(data: dict[str, Any], members: list[Member], made: list[Oblig
     need(0 <= number(data["validation"]["largest_error_m"], "largest_error_m"), "an error must not be negative")
     if number(data["validation"]["largest_error_m"], "largest_error_m") > inside:
         return Report(file, 1, "not proved: the recorded simulation leaves the certified envelope", made)
-    settled, unit = float(members[0].claim.transient), str(members[0].claim.rows[0]["unit"])
+    settled, unit = upward(members[0].claim.transient, 6), str(members[0].claim.rows[0]["unit"])
     bound = milli(proved["tracking_error_m"], unit if coupling is None else "m")
     of = "" if coupling is None else f" of the output, all {len(members)} members together"
-    message = f"proved: |tracking error{of}| <= {bound} from {settled:g} s on"
+    message = f"proved: |tracking error{of}| <= {bound} from {settled} s on"
     used = [use for member in members for use in member.used]
-    return Report(file, 0, message, made, used, *unsourced(data))
+    return Report(file, 0, message, made, used, *unsourced(data), data["study"]["plant"]["model"])
 
 
 def unsourced(data: dict[str, Any]) -> tuple[list[str], list[str]]:
@@ -154,8 +158,12 @@ def unsourced(data: dict[str, Any]) -> tuple[list[str], list[str]]:
 def check_file(path: Path) -> Report:
     """Re-prove one file."""
     shown = plainly(str(path))
+    shown = shown if len(shown.split()) <= 1 and ": " not in shown else repr(" ".join(shown.split()))
     try:
-        with path.open("rb") as stream:
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+        with os.fdopen(handle, "rb") as stream:
+            if not stat.S_ISREG(os.fstat(handle).st_mode):
+                return Report(shown, 2, "unreadable: it is no regular file")
             content = stream.read(MAX_BYTES + 1)
         if len(content) > MAX_BYTES:
             return Report(shown, 2, f"unreadable: a gain file has at most {MAX_BYTES} bytes")
@@ -180,7 +188,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("-v", "--verbose", action="store_true", help="show every obligation")
     options = parser.parse_args(arguments)
     reports = [check_file(path) for path in options.files]
-    show(reports, as_json=options.json, verbose=options.verbose)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+    try:
+        show(reports, as_json=options.json, verbose=options.verbose)
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return max(report.status for report in reports)
 
 
@@ -212,7 +226,8 @@ def limit_lines(report: Report) -> list[str]:
 
 def source_lines(report: Report) -> list[str]:
     """What the numbers rest on, in lines of a terminal."""
-    lines = wrapped(f"still the bundled machine's: {', '.join(report.bundled)}") if report.bundled else []
+    whose = f"the defaults of {report.model}" if ".py" in report.model else f"of the bundled {report.model}"
+    lines = wrapped(f"still {whose}: {', '.join(report.bundled)}") if report.bundled else []
     return lines + (wrapped(f"assumed: {', '.join(report.assumed)}") if report.assumed else [])
 
 
@@ -223,7 +238,8 @@ def obligation_lines(report: Report, *, everything: bool) -> list[str]:
     for o in report.obligations:
         if everything or o.verdict != "proved":
             name = f"{o.member}: {o.name}" if many and o.member else o.name
-            lines += wrapped(f"{o.verdict} {name}, margin {downward(o.margin)} {o.unit}: {o.statement}")
+            unit = "" if o.unit == "1" else f" {o.unit}"
+            lines += wrapped(f"{o.verdict} {name}, margin {downward(o.margin)}{unit}: {o.statement}")
             lines += wrapped(f"would pass: {o.remedy}", "    ") if o.remedy else []
     return lines
 

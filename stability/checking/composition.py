@@ -10,7 +10,7 @@ from __future__ import annotations
 from fractions import Fraction
 from itertools import product
 
-from .arithmetic import down, exponential, magnitude, root, up
+from .arithmetic import WORK, down, exponential, magnitude, root, up
 from .claim import Claim
 from .limits import NotProvedError
 from .loop import Loop
@@ -42,6 +42,7 @@ def conditions_hold(claim: Claim, loop: Loop, spare: Fraction) -> bool:
             low, high = down(-(w[i] * a[1] + w[j] * b[1]) / 2), up(-(w[i] * a[0] + w[j] * b[0]) / 2)
             middle[i][j] = middle[j][i] = (low + high) / 2
             radius[i][j] = radius[j][i] = (high - low) / 2
+    WORK.one(2 ** (n - 1) * n**3)
     for signs in product((1, -1), repeat=n - 1):
         z = (1, *signs)
         if not positive_definite([[middle[i][j] - z[i] * z[j] * radius[i][j] for j in range(n)] for i in range(n)]):

@@ -12,15 +12,18 @@ from itertools import product
 from typing import Any
 
 from .arithmetic import ONE, ZERO, Interval, add, down, magnitude, mul, neg, root, symmetric, up
-from .effects import felt
+from .effects import felt, run
 from .fixed import slopes
 from .forms import derivative
-from .limits import CARRIED, LEAST_EFFECT, LOAD_PARTS, NAME, SPEED_PARTS, NotProvedError, need
+from .limits import CARRIED, LEAST_EFFECT, LEAST_LOAD, LEAST_SLOPE, LOAD_PARTS, NAME, SPEED_PARTS, NotProvedError, need
 from .matrices import dot
 from .member import Member, accelerating
-from .motion import cut, motion_of, slices
-from .obligation import Obligation, decided, milli
+from .motion import cut, slices
+from .obligation import Obligation, decided, milli, percent, upward
 from .parsing import number, numbers, reads, valid_program
+
+#: Step of a difference quotient of the output.
+NUDGE = 1e-4
 
 
 class Coupling:
@@ -48,6 +51,8 @@ class Coupling:
         for name, (low, high) in self.disturbed.items():
             need(NAME.fullmatch(name) is not None and name not in inputs, "a disturbance needs a name of its own")
             need(low <= high, f"the range of {name} is upside down")
+            constant = study["uncertainty"]["disturbances"][name]["course"] == "constant"
+            need(constant, f"{name} of a machine is constant in a run")
         need(len(self.loads["outputs"]) == self.count, "each member needs a load")
         need(reads(self.loads) <= {*inputs, *self.disturbed}, "the loads read a name that no member has")
         unread = set(self.disturbed) - reads(self.loads)
@@ -72,7 +77,6 @@ class Coupling:
     def _own(self, member: Member) -> Fraction:
         """The inertia of the bodies that a member's own model carries."""
         names = [name for name in CARRIED if name in member.claim.parameters]
-        motion_of(member)
         need(len(names) == 1, f"{member.name}: the plant must carry a part of the machine's inertia")
         low, high = member.claim.parameters[names[0]]
         need(low == high, f"{member.name}: its part of the machine's inertia must be a number")
@@ -84,13 +88,10 @@ class Coupling:
         statement = f"the references of all {self.count} members share their knots"
         made.append(decided("motion", statement, Fraction(len(self.slices)), "slices", "references of one duration"))
         worst, which = self._loads()
-        middle = {name: float(low + high) / 2 for name, (low, high) in self.disturbed.items()}
-        along = {
-            name: float(sum(self.slices[len(self.slices) // 2][j][order])) / 2 for name, j, order in self.signals
-        }  # fmt: skip
-        effect, weakest = felt(self.loads, {**along, **middle}, self.disturbed)
-        need(effect > LEAST_EFFECT, f"the loads do not change with {weakest}")
-        statement = f"what the members do to each other is inside what each was proved under; the tightest is {which}"
+        payloads = self._felt()
+        statement = (
+            f"{payloads}what the members do to each other is inside what each was proved under; the tightest is {which}"
+        )
         remedy = "smaller guarantees, or gains that are proved under more load"
         made.append(decided("loads", statement, worst, "1", remedy))
         statement = "inside the guarantees the accelerations follow from the loads in one way: the coupling contracts"
@@ -99,10 +100,45 @@ class Coupling:
         bound = self.output([member.ultimate for member in self.members])
         if self.stated < bound:
             raise NotProvedError("the envelope states a smaller bound on the output than can be proved")
-        settled = float(self.members[0].claim.transient)
-        statement = f"from {settled:g} s on the output is within {milli(bound, 'm')} of its reference"
+        settled = upward(self.members[0].claim.transient, 6)
+        moved = ", ".join(f"{slope:.3g} m/{member.claim.rows[0]['unit']} of {member.name}"
+                          for slope, member in zip(self._reach(), self.members, strict=True))  # fmt: skip
+        statement = f"from {settled} s on the output, which moves by up to {moved}, is within {milli(bound, 'm')}"
         made.append(decided("output", statement, self.required - bound, "m", f"a requirement of {milli(bound, 'm')}"))
         return made
+
+    def _felt(self) -> str:
+        """What the disturbances do to the loads; refuses loads that feel neither them nor the other members."""
+        middle = {name: float(low + high) / 2 for name, (low, high) in self.disturbed.items()}
+        part = self.slices[len(self.slices) // 2]
+        middle |= {name: float(sum(part[j][order])) / 2 for name, j, order in self.signals}
+        size = max(max(map(abs, run(self.loads, middle.__getitem__))), 1e-300)
+        text = ""
+        for name, changes in felt(self.loads, middle, self.disturbed).items():
+            low, high = self.disturbed[name]
+            share = Fraction(max(changes) / size)
+            need(low == high or share > LEAST_LOAD, f"the loads do not change with {name}")
+            text += f"{name} changes the loads by up to {percent(share, up=False)}; " if low < high else ""
+        for j, member in enumerate(self.members if self.count > 1 else ()):
+            ranges = {name: (middle[name], middle[name] + NUDGE) for name, k, _ in self.signals if k == j}
+            others = [max(c for i, c in enumerate(v) if i != j) for v in felt(self.loads, middle, ranges).values()]
+            need(max(others) > float(LEAST_EFFECT) * size, f"no load of another member feels {member.name}")
+        return text
+
+    def _reach(self) -> list[float]:
+        """How much the output moves with each member's position at most, of some slices of the motion."""
+        found = [0.0] * self.count
+        for part in self.slices[:: max(1, len(self.slices) // 16)]:
+            middle = {f"x{j}": float(sum(part[j][0])) / 2 for j in range(self.count)}
+            for j in range(self.count):
+                name = f"x{j}"
+                if self.members[j].claim.first == "position":
+                    changes = felt(self.place, middle, {name: (middle[name], middle[name] + NUDGE)}).get(name, [0.0])
+                    found[j] = max(found[j], sum(c * c for c in changes) ** 0.5 / NUDGE)
+        for j, member in enumerate(self.members):
+            seen = found[j] >= LEAST_SLOPE or member.claim.first == "speed"
+            need(seen, f"the output hardly moves with {member.name}: {found[j]:.3g} m per unit")
+        return found
 
     def _ranges(self, part: list[list[Interval]], half_widths: list[tuple[Fraction, ...]]) -> dict[str, Interval]:
         return {

@@ -12,12 +12,9 @@ from typing import Any
 
 from .arithmetic import Interval
 from .claim import Claim
-from .limits import need
+from .limits import FLOOR, MET, need
 from .parsing import number, numbers
 from .reference import ranges_on
-
-#: A place is met and a duration kept to this share of its size; a limit to this share.
-MET = Fraction(1, 10**9)
 
 
 def follows(data: dict[str, Any], entry: dict[str, Any], claim: Claim, which: int) -> None:
@@ -59,6 +56,8 @@ def follows(data: dict[str, Any], entry: dict[str, Any], claim: Claim, which: in
             )
         else:
             need(lasted <= number(section["longest_s"], "longest_s") * (1 + MET), f"move {k + 1} lasts too long")
+    lasted = number(segments[-1]["knots"][-1], "a knot")
+    need(claim.transient < lasted, "the transient outlasts the reference")
     _limited(section, claim, segments)
 
 
@@ -68,7 +67,7 @@ def _of(segment: dict[str, Any]) -> tuple[list[Fraction], list[Fraction]]:
 
 
 def _close(value: Fraction, wanted: Fraction) -> bool:
-    return abs(value - wanted) <= MET * max(Fraction(1), abs(wanted))
+    return abs(value - wanted) <= MET * abs(wanted) + FLOOR
 
 
 def _quintic(knots: list[Fraction], points: list[Fraction]) -> bool:

@@ -6,37 +6,37 @@ plant that multiplies its load by 0, a parameter without effect, a machine that 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from .arithmetic import WORK
+from .arithmetic import WORK, Interval
 from .claim import Claim
 from .forms import walk
 from .golden import float_apply
 from .limits import NotProvedError
 
-#: Shares of the certified size of every state and input at which a plant is looked at, either way.
-SHARES = (0.0, 1e-3, 1e-2, 0.1, 1.0)
+#: Shares of the certified size of every state and input at which a plant is looked at.
+SHARES = (-1.0, -0.5, -0.1, -0.01, -0.001, 0.0, 0.001, 0.01, 0.1, 0.5, 1.0)
 
 
-def least_effect(claim: Claim, sizes: dict[str, float]) -> tuple[Fraction, str]:
-    """The smallest effect on a plant, relative to its row, of going through a stated range; and what has it.
+def effects_of(claim: Claim, ranges: dict[str, Interval]) -> dict[str, Fraction]:
+    """The effect on a plant, relative to its row, of going through each stated range inside the certified set.
 
     A number without a range is moved by a percent; one that is zero is left out.
 
     Args:
         claim: The statement.
-        sizes: Size of every state and input over the certified set.
+        ranges: Range of every state and input over the certified set.
     """
     stated = {**claim.parameters, **claim.disturbances}
     middle = {name: float((low + high) / 2) for name, (low, high) in stated.items()}
     for name, (value, _) in claim.feedforward.items():
         middle[name] = float(value[0] + value[1]) / 2
-    points = [{s: sign * share * v for s, v in sizes.items()} for sign in (-1.0, 1.0) for share in SHARES]
+    points = [{name: _clipped(low, high, share) for name, (low, high) in ranges.items()} for share in SHARES]
     rates = [_rates(claim, {**middle, **point}) for point in points]
     size = [max(max(abs(r[i]) for r in rates), 1e-300) for i in range(len(claim.rows))]
-    found: list[tuple[Fraction, str]] = []
+    found: dict[str, Fraction] = {}
     for name, (low, high) in stated.items():
         ends = _ends(low, high)
         if ends is None:
@@ -45,8 +45,14 @@ def least_effect(claim: Claim, sizes: dict[str, float]) -> tuple[Fraction, str]:
         for point in points:
             one, other = (_rates(claim, {**middle, **point, name: end}) for end in ends)
             seen = max(seen, *(abs(a - b) / s for a, b, s in zip(one, other, size, strict=True)))
-        found.append((Fraction(seen), name))
-    return min(found, default=(Fraction(1), "nothing"))
+        found[name] = Fraction(seen)
+    return found
+
+
+def _clipped(low: Fraction, high: Fraction, share: float) -> float:
+    """A share of the largest size of a range, where it lies inside it; else the end that is nearer."""
+    wanted = share * max(abs(float(low)), abs(float(high)))
+    return min(max(wanted, float(low)), float(high))
 
 
 def _ends(low: Fraction, high: Fraction) -> tuple[float, float] | None:
@@ -71,13 +77,11 @@ def run(program: dict[str, Any], read: Callable[[str], float]) -> list[float]:
 
 
 def felt(
-    program: dict[str, Any], middle: dict[str, float], ranges: Mapping[str, tuple[Fraction, ...]]
-) -> tuple[Fraction, str]:
-    """The smallest effect on the loads of a machine, relative to the largest, of going through each range."""
-    size = max(max(map(abs, run(program, middle.__getitem__))), 1e-300)
-    found: list[tuple[Fraction, str]] = []
-    for name, (low, high) in ranges.items():
-        if low < high:
-            one, other = (run(program, {**middle, name: float(end)}.__getitem__) for end in (low, high))
-            found.append((Fraction(max(abs(a - b) for a, b in zip(one, other, strict=True)) / size), name))
-    return min(found, default=(Fraction(1), "nothing"))
+    program: dict[str, Any], middle: dict[str, float], ranges: Mapping[str, Iterable[Any]]
+) -> dict[str, list[float]]:
+    """How much each output of an operation list changes over a range of each of its inputs, others at their middle."""
+    found = {}
+    for name, ends in ranges.items():
+        one, other = (run(program, {**middle, name: float(end)}.__getitem__) for end in ends)
+        found[name] = [abs(a - b) for a, b in zip(one, other, strict=True)]
+    return found

@@ -20,6 +20,8 @@ UNIT: Fixed = (1 << SCALE, 1 << SCALE)
 NONE: Fixed = (0, 0)
 #: What a tanh costs, in products.
 TANH_COST = 300
+#: What a sine and a cosine of one number cost, in products.
+TURN_COST = 20
 
 
 def to_fixed(a: Interval) -> Fixed:
@@ -55,6 +57,7 @@ def fixed_inverse(a: Fixed) -> Fixed:
     """Reciprocal."""
     if a[0] <= 0 <= a[1]:
         raise NotProvedError("a divisor can vanish in the assumed box")
+    WORK.one()
     one = 1 << 2 * SCALE
     return one // a[1], -(-one // a[0])
 
@@ -69,6 +72,7 @@ def fixed_root(a: Fixed) -> Fixed:
     """Range of the square root."""
     if a[0] < 0:
         raise NotProvedError("a square root of a negative number in the assumed box")
+    WORK.one(2 + a[1].bit_length() // 16)
     return math.isqrt(a[0] << SCALE), math.isqrt(a[1] << SCALE) + 1
 
 
@@ -80,6 +84,7 @@ def fixed_turn(x: int) -> tuple[Fixed, Fixed]:
     """
     if abs(x) > 100 << SCALE:
         raise NotProvedError("an angle of the machine is beyond 100 rad")
+    WORK.one(TURN_COST)
     doublings = 0
     while abs(x) > 1 << (SCALE - 1):
         x, doublings = x >> 1, doublings + 1

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from .arithmetic import ONE, ZERO, Interval, add, intersect, inverse, magnitude, mul, neg, root, square, tanh
+from .arithmetic import ONE, WORK, ZERO, Interval, add, intersect, inverse, magnitude, mul, neg, root, square, tanh
 
 Form = dict[str, Interval]
 
@@ -20,6 +20,7 @@ def plus(*forms: Form) -> Form:
     """Sum of forms."""
     result: Form = {}
     for form in forms:
+        WORK.one(len(form) // 8)
         for symbol, value in form.items():
             result[symbol] = add(result[symbol], value) if symbol in result else value
     return result
@@ -74,6 +75,7 @@ class Table:
         """Replace derived symbols by their definitions, newest first."""
         for symbol in reversed(list(self.definitions)):
             if symbol in form and not symbol.startswith(keep):
+                WORK.one(len(form) // 8)
                 rest = {s: v for s, v in form.items() if s != symbol}
                 form = plus(rest, times(self.definitions[symbol], form[symbol]))
         return form
@@ -84,6 +86,7 @@ def walk(
 ) -> list[Any]:
     """Run an operation list in any arithmetic; returns every entry."""
     table: list[Any] = []
+    WORK.one(len(program["operations"]) // 64)
     for operator, *arguments in program["operations"]:
         if operator == "input":
             table.append(read(arguments[0]))

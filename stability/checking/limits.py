@@ -35,8 +35,14 @@ MAX_BYTES, MAX_DIGITS, MAX_EXPONENT, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS 
 MAX_CELLS = 64
 #: A range of an assumption is that of the study to this share: it is written rounded outwards.
 ROUND = Fraction(1, 10**12)
+#: A place is met and a duration kept to this share of its size and a picometre or picosecond; a limit to that share.
+MET, FLOOR = Fraction(1, 10**9), Fraction(1, 10**12)
 #: An effect of what a study states, relative to all that moves a row, below which it counts for none.
 LEAST_EFFECT = Fraction(1, 10**9)
+#: The same of a load: relative to all that moves a row, and to the loads of a machine.
+LEAST_LOAD = Fraction(1, 10**4)
+#: A member moves the output by at least this much per unit of its position, m/m or m/rad.
+LEAST_SLOPE = 0.05
 #: Interval products that all members and the coupling of a machine may take; files of ours take up to half.
 MAX_PRODUCTS, MAX_COUPLED = 250_000, 4_500_000
 #: Members of a machine, and slices of time that its motion may be cut into.
@@ -51,9 +57,7 @@ BITS, MAX_SHIFT = 96, 3_000
 #: Fixed-point bits of matrix exponentials, terms of their series, largest norm, and a bound on all their errors.
 FIXED, TERMS, MAX_NORM, FIXED_ERROR = 192, 120, 20, Fraction(1, 2**100)
 #: Fractional bits of the fixed-point intervals of a coupling, and bits beyond which nothing is proved.
-SCALE, MAX_FIXED = 160, 4_000
-#: Bits of the denominators of a reference's numbers.
-MAX_BITS = 400
+SCALE, MAX_FIXED = 160, 1_000
 #: A unit, such as "kg m^2", "N m" or "rad/s".
 UNIT_TEXT = re.compile(r"1|[A-Za-z]{1,4}(\^[2-4])?( [A-Za-z]{1,4}(\^[2-4])?){0,3}(/[A-Za-z]{1,4}(\^[2-4])?)?")
 NAME, NUMBER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}"), re.compile(r"-?[0-9]+(/[0-9]+|(\.[0-9]+)?([eE][+-]?[0-9]+)?)")

@@ -18,6 +18,7 @@ from .parsing import number
 from .reading import read
 from .sampled import Held
 from .statement import consistent
+from .structure import different, well_formed
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     claim = read(data, entry, coupled)
     consistent(data, entry, claim)
     follows(data, entry, claim, which)
+    well_formed(claim)
+    different(entry["golden"], claim)
     made, loop, verdict = obligations(claim)
     agree = golden_agree(entry["golden"], claim)
     seen = number(data["validation"]["members"][claim.name]["largest_error"], "largest_error")

@@ -10,9 +10,8 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-from .arithmetic import ONE, Interval
+from .arithmetic import Interval
 from .limits import MAX_SLICES, need
-from .member import Member
 from .parsing import index, number
 from .reference import ranges_on
 
@@ -21,23 +20,6 @@ def cut(a: Interval, count: int) -> list[Interval]:
     """Parts of an interval that cover it."""
     ends = [a[0] + (a[1] - a[0]) * Fraction(k, count) for k in range(count + 1)]
     return list(pairwise(ends))
-
-
-def motion_of(member: Member) -> None:
-    """Refuse a member whose first two states are not a position and its rate, or whose law does not know the rate.
-
-    Where a speed comes first nothing else is asked: its rate is what the plant says.
-    """
-    claim = member.claim
-    if claim.first == "speed":
-        return
-    operations, outputs = claim.plant["operations"], claim.plant["outputs"]
-    kinematic = operations[outputs[len(claim.rows)]] == ["input", claim.rows[1]["state"]]
-    need(kinematic and member.loop.mass[0] == ONE, f"{member.name}: the first state's rate is not the second state")
-    need(claim.rows[1]["target"] == 0, f"{member.name}: the second state does not follow the first")
-    term = claim.law[0]
-    rate = term["operations"][term["outputs"][0]] == ["input", "r1"]
-    need(rate, f"{member.name}: the first modelling term is not the reference's rate")
 
 
 def slices(together: list[Any], halvings: Any) -> Iterable[list[list[Interval]]]:

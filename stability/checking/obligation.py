@@ -34,8 +34,8 @@ class Use:
 class Report:
     """The verdict on one file: status 0 proved, 1 not proved, 2 unreadable.
 
-    `uses` are the shares of the limits, `bundled` what the study left to the bundled machine, `assumed` what has no
-    source.
+    `uses` are the shares of the limits, `bundled` what the study left to the bundled machine `model`, `assumed` what
+    has no source.
     """
 
     file: str
@@ -45,6 +45,7 @@ class Report:
     uses: list[Use] = field(default_factory=list)
     bundled: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
+    model: str = ""
 
 
 def decided(name: str, statement: str, margin: Fraction, unit: str, remedy: str, *, member: str = "",

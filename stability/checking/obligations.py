@@ -12,10 +12,10 @@ from .arithmetic import root, up
 from .claim import Claim
 from .composition import Composed
 from .deviation import Deviation
-from .effects import least_effect
-from .limits import LEAST_EFFECT, ROUNDING, NotProvedError
+from .effects import effects_of
+from .limits import LEAST_EFFECT, LEAST_LOAD, ROUNDING, NotProvedError
 from .loop import Loop
-from .obligation import Obligation, Use, below, decided, milli, percent
+from .obligation import Obligation, Use, below, decided, milli, percent, upward
 from .sampled import Held
 
 
@@ -100,11 +100,15 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     if made[0].verdict != "proved":
         raise NotProvedError("the certificate is about an empty set (obligation non-vacuity)")
     loop, verdict = judge(claim, ROUNDING)
-    sizes = {name: float(loop.signal(name)) for name in (*(row["state"] for row in claim.rows), *claim.inputs)}
-    effect, weakest = least_effect(claim, sizes)
-    moved = percent(effect, up=False)
-    statement = f"the plant feels everything that the study states, {weakest} the least: {moved} of what moves its row"
-    state("plant", statement, effect - LEAST_EFFECT, "1", f"a plant that feels {weakest}")
+    ranges = {row["state"]: loop.nodes[row["state"]].range for row in claim.rows}
+    ranges |= {name: (-loop.signal(name), loop.signal(name)) for name in claim.inputs}
+    effects = effects_of(claim, ranges)
+    spare = {name: v / (LEAST_LOAD if name in claim.disturbances else LEAST_EFFECT) for name, v in effects.items()}
+    weakest = min(spare, key=spare.__getitem__, default="")
+    loads = "".join(f"{name} moves its row by {percent(effects[name], up=False)}, " for name in claim.disturbances)
+    statement = f"the plant feels everything that the study states: {loads}{weakest} is felt least"
+    margin = min(spare.values(), default=Fraction(2)) - 1
+    state("plant", statement, margin, "1", f"a plant that feels {weakest}")
     span = claim.reference[0]
     inside = min(span[0] - claim.stroke[0], claim.stroke[1] - span[1])
     statement = "the reference is continuous to its acceleration, ends at rest and stays inside the stroke"
@@ -128,7 +132,7 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     state("rounding", statement, next(wider, least), "1", "what the other obligations need")
     error = verdict.ultimate(0)
     unit = str(claim.rows[0]["unit"])
-    statement = f"from {float(claim.transient):g} s on the tracking error is at most {milli(error, unit)}"
+    statement = f"from {upward(claim.transient, 6)} s on the tracking error is at most {milli(error, unit)}"
     state("accuracy", statement, claim.accuracy - error, unit, f"a requirement of {milli(error, unit)}", False)
     for i, stated in enumerate(claim.ultimate):
         if stated < verdict.ultimate(i):

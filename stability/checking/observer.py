@@ -5,6 +5,7 @@ Obligation: observer. Must fail: a slower observer, a worse encoder, another pol
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -13,7 +14,6 @@ from .arithmetic import magnitude, up
 from .coupling import guarantee_of
 from .limits import ROUNDING, NotProvedError, need
 from .member import Member
-from .motion import motion_of
 from .obligation import Obligation, decided
 from .parsing import number
 
@@ -67,6 +67,16 @@ def observer_of(data: dict[str, Any], member: Member) -> Observer:
     first, second, pole = (number(section[key], f"the observer's {key}") for key in ("first", "second", "pole"))
     largest = number(data["study"]["controller"]["observer"]["largest"], "the observer's largest")
     need(first > 0 and second > 0 and largest >= 0, "the observer's gains must be positive")
+    asked = data["study"]["controller"]["observer"]
+    bandwidth = number(asked["bandwidth_rad_s"], "bandwidth_rad_s")
+    need(
+        number(asked["epsilon"], "epsilon") >= 0 and number(asked["sigma"], "sigma") > 0, "an observer adapts forwards"
+    )
+    away = -math.expm1(-float(bandwidth * member.claim.period)) if bandwidth > 0 else 0.0
+    middle = float(1 + largest / 2)
+    wanted = 2 * away / middle, away**2 / (float(member.claim.period) * middle)
+    close = all(abs(float(g) - w) <= 1e-3 * w for g, w in zip((first, second), wanted, strict=True))
+    need(away > 0 and close, "the observer's gains are not those of its bandwidth")
     return Observer(first, second, largest, member.claim.period, pole)
 
 
@@ -77,7 +87,6 @@ def observed(data: dict[str, Any], members: list[Member]) -> Obligation:
     for member in members:
         claim = member.claim
         encoder = number(noise[claim.rows[0]["state"]], "the encoder's error")
-        motion_of(member)
         need(claim.first == "position", "an observer estimates a position and its rate")
         acceleration = guarantee_of(data, member.name)[2] + claim.period * magnitude(claim.reference[3])
         # |v(0) - r'(0)| where |Q_2(0)| and |Q_1(0)| are bounded

@@ -16,6 +16,8 @@ from .limits import MAX_BYTES, MAX_DIGITS, MAX_EXPONENT, MAX_OPERATIONS, NUMBER,
 
 def wrong_schema(found: Any) -> str:
     """What to say to a file of another kind or version."""
+    if found is None:
+        return f'it names no schema, and a gain file names "{SCHEMA}"; write one with design'
     known = {"hdmm-opt/gains/1": "hdmm-opt 0.1 reads it", "hdmm-opt/rejected/2": "a refused design left it, not proved"}
     old = known.get(found if isinstance(found, str) else "", "use the release that wrote the file")
     return f'this release reads "{SCHEMA}": got {str(found)[:60]!r}; {old}'
@@ -65,9 +67,8 @@ def parse(text: str) -> dict[str, Any]:
             text, parse_float=rational, parse_int=rational, parse_constant=constant, object_pairs_hook=pairs
         )
     except json.JSONDecodeError as error:
-        raise UnreadableError(
-            f"not a complete JSON file: {error.msg} at line {error.lineno}; write it again with design"
-        ) from None
+        what = "it looks like a study: run design on it" if text.lstrip()[:1] in ("[", "#") else "write it with design"
+        raise UnreadableError(f"not a complete JSON file: {error.msg} at line {error.lineno}; {what}") from None
     except RecursionError:
         raise UnreadableError("the JSON is nested too deeply") from None
     need(isinstance(data, dict), "a gain file is a JSON object")

@@ -142,6 +142,9 @@ def gains_of(
     gains = [tuple(given[f"{kind}_{k + 1}"] for kind in kinds) for k in range(len(controlled))]
     need(all(b > 0 and e >= 0 and d > 0 and s > 0 for b, e, d, s in gains), "gains must be positive")
     ranges = study["controller"]["members"][name]
+    need(set(ranges) == set(names), f"the ranges of the gains of {name} are not those of its gains")
+    fixed = all(set(r) in ({"value"}, {"min", "max"}) for r in ranges.values())
+    need(fixed, "a gain has either a value, or min and max")
     for entry in entries:
         key, value = entry["name"], given[entry["name"]]
         wanted = ranges[key]
@@ -219,6 +222,7 @@ def stated_ranges(
             need(state in given, f"the study does not say {kind} of {state}")
             value = number(given[state], f"{kind} of {state}")
             need(value >= 0, f"{kind} of {state} must not be negative")
+            need(not (kind == "noise" and k == 1 and observed) or value == 0, f"{state} is estimated, not measured")
             if kind == "initial" or k > 1 or not observed:
                 stated.append((kind, state, -value, value))
     return stated

@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Any
 
 from .arithmetic import WORK, Interval, down, up
-from .limits import MAX_BITS, MAX_COEFFICIENTS, need
+from .limits import MAX_COEFFICIENTS, need
 from .parsing import number, numbers
 
 #: What a piece of a spline costs, in products.
@@ -30,7 +30,6 @@ def reference_bounds(reference: dict[str, Any]) -> list[Interval]:
         need(segment["degree"] == 5 and 6 <= count <= MAX_COEFFICIENTS, "a segment is a spline of degree 5")
         knots = numbers(segment["knots"], count + 6, "knots")
         points = numbers(segment["coefficients"], count, "coefficients")
-        need(max(v.denominator.bit_length() for v in (*knots, *points)) <= MAX_BITS, "a spline's number is too long")
         need(knots[0] == knots[5] and knots[-1] == knots[-6], "a segment's knots must be clamped")
         need(knots == sorted(knots), "knots must not decrease")
         need(all(a < b for a, b in pairwise(knots[5 : count + 1])), "inner knots must increase")

@@ -32,7 +32,7 @@ def entry_of(fixed: dict[str, Rule], optional: dict[str, Rule] | None = None) ->
     def rule(value: Any, where: str) -> None:
         need(isinstance(value, dict), f"{where} must be an object")
         for key in value:
-            need(key in fixed or key in may, f"unknown key {where}.{key:.40}")
+            need(key in fixed or key in may, f"unknown key {where}.{key!r:.40}")
         for key in fixed:
             need(key in value, f"{where}.{key} is missing")
         for key, part in value.items():
@@ -87,6 +87,16 @@ def maybe(part: Rule) -> Rule:
 def plain_number(value: Any, where: str) -> None:
     """A JSON number."""
     need(isinstance(value, Fraction), f"{where} must be a number: got {value!r:.40}")
+
+
+def positive(value: Any, where: str) -> None:
+    """A number above zero."""
+    need(isinstance(value, Fraction) and value > 0, f"{where} must be a number above 0: got {value!r:.40}")
+
+
+def share(value: Any, where: str) -> None:
+    """A number that is not negative."""
+    need(isinstance(value, Fraction) and value >= 0, f"{where} must be a number from 0 on: got {value!r:.40}")
 
 
 def whole(value: Any, where: str) -> None:
@@ -148,7 +158,7 @@ SOURCE = some("table", "derived", "public", "assumed")
 HASH = text
 PAIR = listed(plain_number, 2, 2)
 TRIPLE = listed(plain_number, 3, 3)
-LIMIT = entry_of({"value": plain_number, "unit": unit, "source": SOURCE})
+LIMIT = entry_of({"value": positive, "unit": unit, "source": SOURCE})
 STROKES = {key: PAIR for key in ("stroke_m", "stroke_rad", "stroke_m_s", "stroke_rad_s")}
 DRIVE = entry_of(
     {
@@ -182,14 +192,14 @@ STUDY = entry_of(
             {"level": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
         ),
         "uncertainty": entry_of({
-            "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit})),
+            "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit}), 8),
             "noise": named(plain_number), "initial": named(plain_number),
         }),
         "reference": entry_of(
             {"kind": some("quintic", "bspline"), "coordinates": some("members"),
              "waypoints": listed(listed(plain_number, 1, MAX_MEMBERS), 2, 50),
              "durations_s": listed(plain_number, 0, 49), "dwell_s": plain_number, "objective": some("time", "energy"),
-             "pace": plain_number, "jerk_weight": plain_number, "longest_s": plain_number, "spans": whole},
+             "pace": positive, "jerk_weight": share, "longest_s": positive, "spans": whole},
             {"limits": MOTION_LIMITS},
         ),
         "controller": entry_of(
@@ -200,13 +210,13 @@ STUDY = entry_of(
         ),
         "requirements": entry_of(
             {"tracking_error_m": plain_number, "member_error": named(plain_number)},
-            dict.fromkeys((*REQUIREMENTS, "settling_band_m"), plain_number),
+            dict.fromkeys((*REQUIREMENTS, "settling_band_m"), positive),
         ),
         "tuning": entry_of(
             {"method": some("jaya", "tlbo", "random", "gradient"), "population": whole, "iterations": whole,
              "seed": whole,
-             "weights": entry_of(dict.fromkeys(("rms_error", "certified_bound", "itae", "effort"), plain_number))},
-            {"seconds": plain_number},
+             "weights": entry_of(dict.fromkeys(("rms_error", "certified_bound", "itae", "effort"), share))},
+            {"seconds": positive},
         ),
         "validation": entry_of({"transient_s": plain_number, "monte_carlo": whole, "falsify": whole,
                                 "worst_case": flag, "scenarios": listed(entry_of(SCENARIO), 1, 200)}),

@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Any
 
 from .claim import Claim
-from .limits import CARRIED, NAME, need
+from .limits import CARRIED, MET, NAME, need
 from .parsing import number, reads
 
 #: Meaning of a gain by its kind.
@@ -47,8 +47,6 @@ def consistent(data: dict[str, Any], entry: dict[str, Any], claim: Claim) -> Non
     for k, bound in enumerate(entry["reference"]["derivative_bounds"]):
         unit = own + [*derivatives, "/s^4"][first + k]
         need((bound["name"], bound["unit"]) == (names[k], unit), f"derivative {k} of the reference is in {unit}")
-    golden = [tuple(map(tuple, (v["x"], v["r"], v["theta"]))) for v in entry["golden"]]
-    need(len(set(golden)) == len(golden), "golden vectors must differ from each other")
 
 
 def _units(claim: Claim, units: dict[str, str]) -> None:
@@ -132,15 +130,56 @@ def _terms(claim: Claim, study: dict[str, Any]) -> None:
     modelling = study["controller"]["modelling"]
     need(len(set(modelling)) == len(modelling), "a modelling term stands twice")
     need(all(NAME.fullmatch(term) for term in modelling), "a modelling term must be a plain name")
+    known = any(read.startswith("nominal.") for term in claim.law for read in reads(term))
+    need(not modelling or known, "the study names modelling terms, and the law models nothing")
     for k, term in enumerate(claim.law if not modelling else []):
         allowed = {"r1"} if k == 0 and claim.first == "position" else set()
         need(reads(term) <= allowed, "the law models something, and the study names no modelling term")
+
+
+def _runs(data: dict[str, Any], certified: dict[str, Fraction]) -> None:
+    """Recorded runs without a fault are sound, inside what is proved, and no worse than what is said to be met."""
+    study, shown = data["study"]["validation"], data["validation"]
+    told = {row["name"]: row["simulated"] for row in shown["requirements"]}
+    runs = [r["figures"] for s, r in zip(study["scenarios"], shown["scenarios"], strict=True) if not s["faults"]]
+    runs += [shown["worst_case"]["figures"]] if shown["worst_case"] is not None else []
+    for run_ in runs:
+        need(run_["diverged_s"] is None and run_["maximum_error_m"] is not None, "a recorded run was lost")
+        need(0 <= run_["maximum_error_m"] <= certified["tracking_error_m"], "a recorded run passes what is proved")
+        need(
+            run_["maximum_error_m"] <= run_["largest_error_m"] <= shown["largest_error_m"],
+            "a record is not the largest",
+        )
+        need(0 <= run_["limit_use"] <= 1, "a recorded run passes a limit")
+        for name, own in run_["members"].items():
+            need(name in shown["members"], "records are of the members")
+            limit = next(iter(data["study"]["plant"]["joints"][name]["limits"].values()))["value"]
+            need(
+                own["peak_input"] is not None and own["peak_input"] <= limit * (1 + MET),
+                "a recorded input passes its limit",
+            )
+            for key, value in own.items():
+                if isinstance(value, Fraction) and key != "energy_j":
+                    need(value >= 0, f"{key} must not be negative")
+            for group, before in (("peaks", "peak"), ("rms", "rms")):
+                for output, unit in (("torque", "nm"), ("current", "a")):
+                    met, value = told.get(f"{before}_{output}_{unit}"), own[group].get(output)
+                    if met is not None and value is not None and _rotary(data, name, output):
+                        need(value <= met, f"a recorded run passes {before}_{output}_{unit}")
+
+
+def _rotary(data: dict[str, Any], name: str, output: str) -> bool:
+    """Whether a member's torque is in N m: that of a sliding joint is a force, and no requirement on torque."""
+    rows = next(entry["model"]["rows"] for entry in data["members"] if entry["name"] == name)
+    limit = next(iter(data["study"]["plant"]["joints"][name]["limits"].values()))
+    return output == "current" or any(row["unit"] == "N m" for row in rows) or limit["unit"] in ("N m", "V")
 
 
 def _bundled(section: dict[str, Any]) -> None:
     """What a study left to the bundled machine is named once, and there."""
     given = section.get("bundled", [])
     known = {*section["parameters"], *section.get("ratings", {}), *(f"{name} limit" for name in section["limits"])}
+    known |= {f"{name} tolerance" for name in section["parameters"]}
     need(
         len(set(given)) == len(given) and set(given) <= {*known, "stroke"}, "bundled names what the study does not have"
     )
@@ -197,6 +236,14 @@ def _records(data: dict[str, Any], certified: dict[str, Fraction]) -> None:
             need(inside, f"a recorded estimate of {entry['name']} passes what is proved")
     names = [scenario["name"] for scenario in study["validation"]["scenarios"]]
     need([run["name"] for run in shown["scenarios"]] == names, "the recorded scenarios are not those of the study")
-    drawn = shown["monte_carlo"]
+    _runs(data, certified)
+    drawn, asked = shown["monte_carlo"], study["validation"]
     need(drawn is None or drawn["met"] == drawn["runs"], "a random run missed a requirement")
+    need(bool(asked["monte_carlo"]) <= (drawn is not None), "the study asks for random runs, and none are recorded")
+    need(
+        asked["worst_case"] <= (shown["worst_case"] is not None),
+        "the study asks for a worst case, and none is recorded",
+    )
+    count = drawn["runs"] if drawn is not None else 0
+    need(count <= shown["simulated_runs"], "more random runs are recorded than runs")
     need(number(shown["integration_error_m"], "integration_error_m") >= 0, "an error must not be negative")

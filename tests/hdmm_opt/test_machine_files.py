@@ -215,10 +215,6 @@ def _inertia_that_fades(d):
     plant["outputs"][1] = len(plant["operations"]) - 1
 
 
-def _long_number(d):
-    member(d, "lift")["reference"]["segments"][0]["knots"][6] += 1e-59
-
-
 def _weak_load(d):
     """The load enters a member's plant with a hundredth of its size."""
     program = member(d, "lift")["model"]["plant"]
@@ -261,7 +257,6 @@ MUTATIONS = {
     _parameter_of_nobody: (2, "plant.parameters"), _rate_of_nobody: (2, "controller.rates_hz names something"),
     _requirement_of_nobody: (2, "member_error names something"), _constant_output: (2, "must read a position"),
     _unit_with_a_claim: (2, "unit"), _inertia_that_fades: (2, "an inertia depends on more"),
-    _long_number: (2, "number is too long"),
 }  # fmt: skip
 
 

@@ -61,7 +61,9 @@ def test_a_study_that_gives_every_number_leaves_nothing_to_the_bundled_machine()
     (plant,) = problem.machine.plants
     for name in problem.machine.bundled["actuator"]:
         p = plant.parameters[name]
-        data["plant"]["parameters"][name] = {"value": 0.0 if p.loss else p.value, "unit": p.unit, "source": "assumed"}
+        data["plant"]["parameters"][name] = {
+            "value": 0.0 if p.loss else p.value, "unit": p.unit, "source": "assumed", "tolerance": p.tolerance
+        }  # fmt: skip
     whole = assemble(study.validated(data, "test"))
     assert whole.machine.bundled == {"actuator": ()}
     assert whole.machine.plants[0].parameters["coulomb_friction"].value == 0.0

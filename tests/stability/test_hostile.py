@@ -1,6 +1,7 @@
 """No file keeps the checker busy for long, takes much memory, or makes it fail."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -62,7 +63,42 @@ def with_digits(digits):
     return text.replace('"coefficients": [\n', '"coefficients": [\n' + ("0." + "1" * digits + ",\n") * 900)
 
 
+def arm_loads(tail):
+    """Operations behind the loads of an arm, the last of them added to the first load times nothing."""
+    document = json.loads((GAINS / "arm-p3.gains.json").read_text(encoding="utf-8"))
+    program = document["couplings"][0]["loads"]
+    operations, first = program["operations"], len(program["operations"])
+    operations += tail(first)
+    last = len(operations)
+    operations += [["const", "0.0"], ["mul", last - 1, last], ["add", program["outputs"][0], last + 1]]
+    program["outputs"][0] = last + 2
+    return to_text(seal(document))
+
+
+def roots(first):
+    """Roots of a number of thousands of bits."""
+    large = [["const", "1e50"], *([["sq", first + k] for k in range(3)])]
+    return large + [["sqrt", first + 3] for _ in range(9_000)]
+
+
+def turns(first):
+    return [["sin", 0] for _ in range(10_000)]
+
+
+def padded_law():
+    """Modelling terms of thousands of constants, and a hundred golden vectors."""
+    document = emla()
+    entry = document["members"][0]
+    for term in entry["model"]["law"]:
+        term["operations"] += [["const", f"{k}.123457987651234e-19"] for k in range(11_000)]
+    first = entry["golden"]
+    entry["golden"] = (first * 5)[:100]
+    return to_text(seal(document))
+
+
 HOSTILE = {
+    "roots of long numbers": lambda: arm_loads(roots), "thousands of sines": lambda: arm_loads(turns),
+    "a padded law": padded_law,
     "eight rows, eight inputs, two cells": lambda: wide(emla(), [1] * 7 + [2]),
     "eight rows, eight inputs, eight cells": lambda: wide(emla(), [1] * 5 + [2, 2, 2]),
     "eight rows, eight inputs": lambda: wide(emla(), [1] * 8),
@@ -90,7 +126,8 @@ def test_no_file_keeps_the_checker_busy(name, tmp_path):
     watch = (
         "import resource, runpy, sys; sys.argv = ['checker.py', sys.argv[1]]\n"
         f"try: runpy.run_path({str(checker.__file__)!r}, run_name='__main__')\n"
-        "finally: print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, "
+        "finally:\n  used = [l for l in open('/proc/self/status') if l.startswith('VmHWM')]\n"
+        "  print(int(used[0].split()[1]) / 1024, "
         "sum(resource.getrusage(resource.RUSAGE_SELF)[:2]), file=sys.stderr)"
     )
     begun = time.monotonic()
@@ -104,6 +141,22 @@ def test_what_is_no_regular_file_is_one_line(tmp_path):
     for path in ("/dev/zero", str(tmp_path), "/dev/null", str(tmp_path / "no\x1b[2Jsuch.json"), "a\x00b"):
         report = checker.check_file(checker.Path(path))
         assert report.status == 2 and f"{report.file}{report.message}".isprintable(), path
+
+
+def test_a_pipe_that_nobody_writes_to_is_one_line(tmp_path):
+    os.mkfifo(tmp_path / "pipe.json")
+    report = checker.check_file(tmp_path / "pipe.json")
+    assert report.status == 2 and "no regular file" in report.message
+
+
+def test_a_name_does_not_draw_a_verdict_and_any_terminal_will_do(tmp_path, gain_text):
+    name = "a.gains.json: proved: |tracking error| <= 0.0001 mm from 1 s on" + " " * 20
+    for path in (tmp_path / name, tmp_path / "\u00e9\u4e2d.json"):
+        path.write_text('{"schema": "hdmm-opt/gains/2", "\u00e9\u4e2d": 1}', encoding="utf-8")
+        done = subprocess.run([sys.executable, "-I", "-S", checker.__file__, path], capture_output=True, text=True,
+                              env={"PYTHONIOENCODING": "ascii"})  # fmt: skip
+        assert done.returncode == 2 and "Traceback" not in done.stderr and "unreadable" in done.stdout
+        assert "proved" not in done.stdout or done.stdout.startswith("'")
 
 
 def test_a_byte_order_mark_is_read(tmp_path, gain_text):

@@ -210,6 +210,101 @@ def unit_of_gain(d):
     own(d)["gains"][0]["unit"] = "1"
 
 
+def golden_of_the_jerk(d):
+    """The same vector, but for the jerk, which the law does not read."""
+    first = own(d)["golden"][0]
+    own(d)["golden"] = [{**first, "r": [*first["r"][:3], float(k)]} for k in range(20)]
+
+
+def adaptation_of_nothing(d):
+    for vector in own(d)["golden"]:
+        vector["theta_next"][0] = -9e-9
+
+
+def ghost(name):
+    """A disturbance or parameter that is there only outside the certified set."""
+
+    def bend(d):
+        program = own(d)["model"]["plant"]
+        front = [
+            ["input", "position"], ["const", "0.09"], ["sub", 0, 1], ["const", "10000.0"], ["mul", 2, 3], ["tanh", 4],
+            ["const", "1.0"], ["sub", 6, 5], ["const", "0.5"], ["mul", 7, 8], ["input", name], ["mul", 9, 10],
+        ]  # fmt: skip
+        where, shift = program["operations"].index(["input", name]), len(front)
+        moved = [[o[0], *(11 if a == where else a + shift for a in o[1:])] if o[0] not in ("input", "const") else o
+                 for o in program["operations"]]  # fmt: skip
+        program["operations"], program["outputs"] = front + moved, [o + shift for o in program["outputs"]]
+
+    return bend
+
+
+def dummy_speed(d):
+    """A limit that is about the speed of nothing."""
+    entry, count = own(d), 4
+    model = entry["model"]
+    model["rows"].append({"state": "rod_speed", "unit": "m/s", "target": "zero", "controlled": False})
+    program = model["plant"]
+    operations = program["operations"]
+    operations += [["const", "1.0"], ["input", "rod_speed"], ["const", "-100.0"]]
+    last = len(operations)
+    operations.append(["mul", last - 2, last - 1])
+    program["outputs"] = [*program["outputs"][:3], last - 3, *program["outputs"][3:], last]
+    model["limits"][1]["signals"] = ["rod_speed"]
+    for kind in ("noise", "initial"):
+        d["study"]["uncertainty"][kind]["rod_speed"] = 0.0
+        entry["assumptions"].append(
+            {"name": f"{kind}.rod_speed", "lower": 0.0, "upper": 0.0, "unit": "m/s", "source": "study"}
+        )
+    certificate = entry["certificate"]
+    for key in ("half_widths",):
+        certificate[key].append("1/1000")
+    certificate["envelope"]["ultimate"].append("1/1000")
+    certificate["split"].append(1)
+    for cell in certificate["cells"]:
+        cell["transform"] = [[*row, "0"] for row in cell["transform"]] + [["0"] * 3 + ["1"]]
+        for key in ("reach", "start", "shape"):
+            cell[key].append("1/1000")
+    for vector in entry["golden"]:
+        vector["x"].append(0.0)
+    assert len(model["rows"]) == count
+
+
+def figures_of_a_run(key, value):
+    def bend(d):
+        d["validation"]["scenarios"][0]["figures"][key] = value
+
+    return bend
+
+
+def strong_input(d):
+    d["validation"]["scenarios"][0]["figures"]["members"]["actuator"]["peak_input"] = 5000.0
+
+
+def easy_requirement(d):
+    """A requirement that the file's own runs miss."""
+    d["study"]["requirements"]["peak_torque_nm"] = 1.0
+    row = next(r for r in d["validation"]["requirements"] if r["name"] == "peak_torque_nm")
+    row["simulated"] = 0.001
+
+
+def no_runs(d):
+    d["validation"]["monte_carlo"] = None
+
+
+def no_worst(d):
+    d["validation"]["worst_case"] = None
+
+
+def gain_with_two_ranges(d):
+    value = own(d)["gains"][0]["value"]
+    d["study"]["controller"]["members"]["actuator"]["beta_1"] = {"value": value, "min": 1e6, "max": 1e7}
+    own(d)["gains"][0] |= {"min": value, "max": value}
+
+
+def range_of_no_gain(d):
+    d["study"]["controller"]["members"]["actuator"]["beta_9"] = {"value": 1.0}
+
+
 #: Changes that the forger would undo.
 UNREPEATED = (invented,)
 FALSE = {
@@ -240,6 +335,27 @@ FALSE = {
     "an unknown rating": (study("plant", "joints", "actuator", "bundled", value=["nothing"]), 2),
     "a load in another unit": (study("uncertainty", "disturbances", "load_force", "unit", value="kN"), 2),
     "a parameter in another unit": (study("plant", "joints", "actuator", "parameters", "load_mass", "unit", value="t"), 2),
+    "a load times a hundred-thousandth": (scaled_load("1e-5"), 1),
+    "a load outside the certified set": (ghost("load_force"), 1),
+    "a friction outside the certified set": (ghost("coulomb_friction"), 1),
+    "golden vectors that differ in the jerk alone": (golden_of_the_jerk, 2),
+    "golden vectors without adaptation": (adaptation_of_nothing, 1),
+    "the speed of nothing": (dummy_speed, 2),
+    "a lost run": (figures_of_a_run("diverged_s", 1.0), 2),
+    "a run beyond the bound": (figures_of_a_run("maximum_error_m", 5.0), 2),
+    "a run beyond a limit": (figures_of_a_run("limit_use", 3.0), 2),
+    "a negative record": (figures_of_a_run("maximum_error_m", -1.0), 2),
+    "an input beyond its limit": (strong_input, 2),
+    "a requirement that the runs miss": (easy_requirement, 2),
+    "random runs that were asked for": (no_runs, 2),
+    "a worst case that was asked for": (no_worst, 2),
+    "a gain with two ranges": (gain_with_two_ranges, 2),
+    "a range of no gain": (range_of_no_gain, 2),
+    "modelling terms of a law that models nothing": (study("controller", "modelling", value=["mechanics"]), 2),
+    "a transient longer than the motion": (study("validation", "transient_s", value=1e6), 2),
+    "a member that is locked": (study("plant", "locked", value={"actuator": 0.3}), 2),
+    "pole pairs below zero": (study("plant", "joints", "actuator", "ratings", "pole_pairs", "value", value=-5.0), 2),
+    "a torque limit in another unit": (study("plant", "joints", "actuator", "limits", "torque", "unit", value="mN m"), 2),
     "a name that draws a line": (study("study", "summary", value="x\x1b[2K\rproved"), 2),
     "a lone surrogate": (study("study", "name", value="\ud800"), 2),
     "text from right to left": (study("study", "name", value="x\u202eproved"), 2),
@@ -253,6 +369,71 @@ def test_a_false_statement_is_refused(name, document):
     bend(document)
     report = judged(document, before) if bend not in UNREPEATED else plainly_judged(document)
     assert report.status == status and report.message.isprintable(), report.message
+
+
+def no_place(d):
+    d["couplings"][0]["place"] = {"inputs": ["x0"], "operations": [["input", "x0"], ["const", "1e-30"], ["mul", 0, 1]],
+                                  "outputs": [2]}  # fmt: skip
+
+
+def small_place(d):
+    program = d["couplings"][0]["place"]
+    count = len(program["operations"])
+    program["operations"] += [["const", "0.01"], *(["mul", o, count] for o in program["outputs"])]
+    program["outputs"] = [count + 1 + k for k in range(len(program["outputs"]))]
+
+
+def loads_of_bodies_without_weight(d):
+    names = ("a0", "a1", "a2")
+    operations = [["input", name] for name in names] + [["input", "payload"], ["const", "1e-6"], ["mul", 3, 4]]
+    outputs = []
+    for k, entry in enumerate(d["members"]):
+        inertia = next(a["lower"] for a in entry["assumptions"] if a["name"] == "parameter.load_inertia")
+        load = next(a for a in entry["assumptions"] if a["name"] == "disturbance.load_force")
+        operations += [["const", repr(inertia)], ["const", repr((load["lower"] + load["upper"]) / 2)]]
+        at_ = len(operations)
+        operations += [["mul", k, at_ - 2], ["add", at_, at_ - 1], ["add", at_ + 1, 5]]
+        outputs.append(at_ + 2)
+    d["couplings"][0]["loads"] = {"inputs": [], "operations": operations, "outputs": outputs}
+
+
+def payload_of_any_course(d):
+    d["study"]["uncertainty"]["disturbances"]["payload"]["course"] = "any"
+
+
+def other_order(d):
+    joints = d["study"]["plant"]["joints"]
+    d["study"]["plant"]["joints"] = dict(reversed(joints.items()))
+
+
+def noisy_speed(d):
+    d["study"]["uncertainty"]["noise"]["speed"] = 1000.0
+
+
+def slow_observer(d):
+    d["study"]["controller"]["observer"]["bandwidth_rad_s"] = 1.0
+
+
+def half_a_current(d):
+    d["members"][0]["model"]["limits"][1]["signals"] = ["i_d"]
+
+
+MACHINES = {
+    "an output that nothing moves": ("arm-p3", no_place), "an output of a hundredth": ("arm-p3", small_place),
+    "bodies without weight": ("arm-p3", loads_of_bodies_without_weight),
+    "a payload of any course": ("arm-p3", payload_of_any_course), "joints in another order": ("arm-p3", other_order),
+    "a noise that is estimated": ("crane-p4", noisy_speed), "a slower observer": ("crane-p4", slow_observer),
+    "a limit on half the current": ("crane-p4", half_a_current),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_a_false_statement_about_a_machine_is_refused(name):
+    file, bend = MACHINES[name]
+    document = json.loads((GAINS / f"{file}.gains.json").read_text(encoding="utf-8"))
+    bend(document)
+    report = judged(document)
+    assert report.status in (1, 2) and report.message.isprintable(), report.message
 
 
 def test_a_machine_that_is_the_same_for_every_payload_is_refused():
