@@ -31,9 +31,13 @@ parsing: Numbers, hashes and operation lists of a file, refused where they are m
 
   Must fail: numbers in other forms, doubled keys, changed content, unknown operators, indices that come later.
 
-shape: Every key that a file may have, and what stands at it; whatever else stands in a file is refused.
+shape: Rules for what may stand at a place of a file.
 
   Must fail: unknown or missing keys, numbers as text, text that is no plain text, more entries than a file of ours has.
+
+grammar: Every key that a file may have, and what stands at it; whatever else stands in a file is refused.
+
+  Must fail: a key more, a key less, another kind of value, at every place of a file.
 
 claim: The statement about one member as data.
 
@@ -971,6 +975,21 @@ def versions(value: Any, where: str) -> None:
         text(version, where)
 
 
+def plain_text(value: Any) -> None:
+    """Refuse control characters, lone surrogates and other text that a terminal does not print as it stands."""
+    if isinstance(value, dict):
+        for key, part in value.items():
+            plain_text(key)
+            plain_text(part)
+    elif isinstance(value, list):
+        for part in value:
+            plain_text(part)
+    elif isinstance(value, str) and not value.isprintable():
+        raise UnreadableError(f"a text of the file is not plain text: {value!a:.60}")
+
+
+# --- grammar ---
+
 MODELLING = ("mechanics", "friction", "resistance", "back_emf", "decoupling")
 RANGE = entry_of({}, dict.fromkeys(("value", "min", "max"), plain_number))
 SOURCE = some("table", "derived", "public", "assumed")
@@ -1117,19 +1136,6 @@ FILE = entry_of({
     "schema": text, "study": STUDY, "members": listed(MEMBER, 1, MAX_MEMBERS), "couplings": listed(COUPLING, 0, 1),
     "obligations": listed(OBLIGATION, 0, 200), "validation": VALIDATION, "provenance": PROVENANCE, "sha256": HASH,
 })  # fmt: skip
-
-
-def plain_text(value: Any) -> None:
-    """Refuse control characters, lone surrogates and other text that a terminal does not print as it stands."""
-    if isinstance(value, dict):
-        for key, part in value.items():
-            plain_text(key)
-            plain_text(part)
-    elif isinstance(value, list):
-        for part in value:
-            plain_text(part)
-    elif isinstance(value, str) and not value.isprintable():
-        raise UnreadableError(f"a text of the file is not plain text: {value!a:.60}")
 
 
 def shaped(data: dict[str, Any]) -> None:

@@ -20,81 +20,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .parameter import EFFECTIVENESS, Parameter, effectiveness
-from .plant import Efforts, Limit, Plant
+from .emla_numbers import LIMITS, MECHANICAL, MOTOR, PEAK, RATED, STROKE, TORQUE
+from .parameter import EFFECTIVENESS, Parameter
+from .plant import Efforts, Plant
 from .registry import PlantModel
-
-_FLUX = 0.134 * math.sqrt(2.0)
-
-_MECHANICAL = {
-    "screw_lead": Parameter(value=0.016, unit="m", source="table", meaning="travel of the rod per turn of the screw"),
-    "screw_diameter": Parameter(
-        value=0.064,
-        unit="m",
-        source="derived",
-        meaning="pitch diameter of the screw, for a lead angle of 4.55 deg",
-    ),
-    "gear_ratio": Parameter(value=7.7, unit="1", source="table", meaning="turns of the motor per turn of the screw"),
-    "screw_friction": Parameter(
-        loss=True,
-        value=0.0065,
-        unit="1",
-        tolerance=0.54,
-        source="table",
-        meaning="friction coefficient of the screw, 0.003-0.01",
-    ),
-    "gear_loss": Parameter(loss=True, value=0.02, unit="1", tolerance=0.5, meaning="share of torque lost in the gear"),
-    "motor_inertia": Parameter(value=0.012, unit="kg m^2", tolerance=0.1, meaning="rotor, gear and screw inertia"),
-    "viscous_friction": Parameter(
-        loss=True, value=0.01, unit="N m s/rad", tolerance=0.3, meaning="viscous friction at the motor"
-    ),
-    "coulomb_friction": Parameter(
-        loss=True, value=300.0, unit="N", tolerance=0.5, meaning="Coulomb friction of the rod"
-    ),
-    "friction_speed": Parameter(value=0.002, unit="m/s", meaning="speed over which Coulomb friction builds up"),
-    "power_scale": Parameter(value=100.0, unit="W", meaning="power over which the screw's loss changes direction"),
-    "load_mass": Parameter(value=2000.0, unit="kg", tolerance=0.2, meaning="mass that moves with the rod"),
-}
-_TORQUE = {
-    "torque_scale": Parameter(value=1.0, unit="1", tolerance=0.03, meaning="torque delivered per torque commanded"),
-    "drive_lag": Parameter(value=0.0003, unit="s", tolerance=0.2, meaning="time constant of the drive's current loop"),
-    EFFECTIVENESS: effectiveness(1.0),
-}
-_MOTOR = {
-    "pole_pairs": Parameter(value=4.0, unit="1", source="table", meaning="pole pairs of the motor"),
-    "torque_constant": Parameter(
-        value=6 * _FLUX, unit="N m/A", tolerance=0.03, source="derived",
-        meaning="torque per ampere of amplitude; per ampere RMS it is sqrt(2) times as large",
-    ),
-    "resistance": Parameter(value=0.08, unit="ohm", tolerance=0.2, source="table", meaning="phase resistance"),
-    "inductance": Parameter(value=0.00242, unit="H", tolerance=0.05, source="table", meaning="phase inductance"),
-}  # fmt: skip
-_RATED = {
-    "rated_torque": Parameter(
-        value=37.1, unit="N m", source="derived", meaning="torque that it may deliver all the time"
-    ),
-    "rated_current": Parameter(
-        value=23.1 * math.sqrt(2.0),
-        unit="A",
-        source="table",
-        meaning="current that it may carry all the time, amplitude",
-    ),
-    "peak_current": Parameter(
-        value=48.2 * math.sqrt(2.0), unit="A", source="table", meaning="largest current, amplitude"
-    ),
-}
-_PEAK = {"peak_torque": Parameter(value=77.0, unit="N m", source="table", meaning="largest torque of the motor")}
-#: Peaks of the bundled motor, for limits that a study does not give.
-_SPEED = 3877.0 / 60.0 * 0.016 / 7.7
-_LIMITS = {
-    "torque": Limit(name="torque", signals=("torque_command",), value=77.0, unit="N m", source="table"),
-    "voltage": Limit(
-        name="voltage", signals=("u_q", "u_d"), value=380.0 * math.sqrt(2.0 / 3.0), unit="V", source="derived"
-    ),
-    "current": Limit(name="current", signals=("i_q", "i_d"), value=48.2 * math.sqrt(2.0), unit="A", source="derived"),
-    "speed": Limit(name="speed", signals=("speed",), value=_SPEED, unit="m/s", source="derived"),
-}
-_STROKE = (0.0, 0.6)
 
 _OUTPUT_UNITS = {"torque": "N m", "current": "A", "power": "W"}
 
@@ -109,13 +38,13 @@ def defaults(level: str) -> dict[str, Parameter]:
     """
     if level not in LEVELS:
         raise ValueError(f'plant.level is "torque" or "voltage": got "{level}"')
-    return {**_MECHANICAL, **(_TORQUE if level == "torque" else _MOTOR)}
+    return {**MECHANICAL, **(TORQUE if level == "torque" else MOTOR)}
 
 
 def ratings(level: str) -> dict[str, Parameter]:
     """Numbers of the motor that the equations of a level do not read; its currents and voltages follow from them."""
-    rated = {name: _RATED[name] for name in ("rated_torque", "rated_current")}
-    return {**_MOTOR, **_RATED} if level == "torque" else {**_PEAK, **rated}
+    rated = {name: RATED[name] for name in ("rated_torque", "rated_current")}
+    return {**MOTOR, **RATED} if level == "torque" else {**PEAK, **rated}
 
 
 def transmission(values: Mapping[str, Any]) -> Any:
@@ -226,8 +155,8 @@ def _torque_level(known: Mapping[str, Parameter], motor: Mapping[str, Parameter]
         x=x, u=u, w=w, p=p,
         mass=ca.vertcat(1, mass, q["drive_lag"]),
         force=ca.vertcat(x[1], force, q[EFFECTIVENESS] * u[0] - x[2]),
-        limits=(_LIMITS["torque"], _LIMITS["speed"]),
-        stroke=_STROKE,
+        limits=(LIMITS["torque"], LIMITS["speed"]),
+        stroke=STROKE,
         ratings=motor,
         outputs={
             "torque": torque, "current": ca.fabs(torque) / motor["torque_constant"].value,
@@ -267,8 +196,8 @@ def _voltage_level(known: Mapping[str, Parameter], motor: Mapping[str, Parameter
             u[0] - resistance * x[2] - inductance * (electrical_speed * x[3]) - q["torque_constant"] * turning / 1.5,
             u[1] - resistance * x[3] + inductance * (electrical_speed * x[2]),
         ),
-        limits=(_LIMITS["voltage"], _LIMITS["current"], _LIMITS["speed"]),
-        stroke=_STROKE,
+        limits=(LIMITS["voltage"], LIMITS["current"], LIMITS["speed"]),
+        stroke=STROKE,
         ratings=motor,
         outputs={"torque": torque, "current": ca.norm_2(x[2:4]), "power": torque * turning},
         output_units=_OUTPUT_UNITS, carried="load_mass",

@@ -12,9 +12,9 @@ from pathlib import Path
 
 #: The parts in the order in which they stand; each uses those before it.
 ORDER = (
-    "limits", "arithmetic", "forms", "fixed", "parsing", "shape", "claim", "reference", "statement", "structure",
-    "course", "reading", "loop", "deviation", "matrices", "period", "obligation", "composition", "sampled", "golden",
-    "effects", "obligations", "member", "motion", "coupling", "observer", "command",
+    "limits", "arithmetic", "forms", "fixed", "parsing", "shape", "grammar", "claim", "reference", "statement",
+    "structure", "course", "reading", "loop", "deviation", "matrices", "period", "obligation", "composition", "sampled",
+    "golden", "effects", "obligations", "member", "motion", "coupling", "observer", "command",
 )  # fmt: skip
 TARGET = Path(__file__).parent.parent / "checker.py"
 

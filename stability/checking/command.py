@@ -16,6 +16,7 @@ from typing import Any
 
 from .arithmetic import WORK
 from .coupling import Coupling, guarantees_kept
+from .grammar import shaped
 from .limits import (
     MAX_BYTES,
     MAX_COUPLED,
@@ -31,7 +32,6 @@ from .member import Member, check_member
 from .obligation import Obligation, Report, downward, milli, percent, upward
 from .observer import observed
 from .parsing import check_digests, number, parse, wrong_schema
-from .shape import shaped
 from .statement import met
 
 
