@@ -2437,7 +2437,7 @@ class Report:
     """The verdict on one file: status 0 proved, 1 not proved, 2 unreadable.
 
     `uses` are the shares of the limits, `bundled` what the study left to the bundled machine `model`, `assumed` what
-    has no source.
+    has no source, `records` what of a draft's records contradicts the study or the proof.
     """
 
     file: str
@@ -2448,6 +2448,7 @@ class Report:
     bundled: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
     model: str = ""
+    records: str = ""
 
 
 def decided(name: str, statement: str, margin: Fraction, unit: str, remedy: str, *, member: str = "",
@@ -2896,7 +2897,11 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     effects = effects_of(claim, ranges)
     spare = {name: v / (LEAST_LOAD if name in claim.disturbances else LEAST_EFFECT) for name, v in effects.items()}
     weakest = min(spare, key=spare.__getitem__, default="")
-    loads = "".join(f"{name} moves its row by {percent(effects[name], up=False)}, " for name in claim.disturbances)
+    loads = "".join(
+        f"{name} moves its row by {percent(effects[name], up=False)}, "
+        for name in claim.disturbances
+        if name in effects
+    )
     statement = f"the plant feels everything that the study states: {loads}{weakest} is felt least"
     margin = min(spare.values(), default=Fraction(2)) - 1
     state("plant", statement, margin, "1", f"a plant that feels {weakest}")
@@ -3377,7 +3382,7 @@ def check_text(text: str, file: str = "", *, recorded: bool = True) -> Report:
         need(data.get("schema") == SCHEMA, wrong_schema(data.get("schema")))
         shaped(data)
         check_digests(text)
-        report = check_machine(data, file)
+        report = check_machine(data, file, recorded)
         differs = remembered(data, report) if recorded and not report.status else ""
         return replace(report, status=1, message=f"not proved: {differs}") if differs else report
     except UnreadableError as error:
@@ -3404,7 +3409,7 @@ def remembered(data: dict[str, Any], report: Report) -> str:
     return "" if len(told) == len(report.obligations) else "the file records an obligation that there is not"
 
 
-def check_machine(data: dict[str, Any], file: str) -> Report:
+def check_machine(data: dict[str, Any], file: str, recorded: bool = True) -> Report:
     """Re-prove each member by itself, then what the members assume of each other."""
     names = [entry["name"] for entry in data["members"]]
     need(0 < len(names) <= MAX_MEMBERS and len(set(names)) == len(names), f"a machine has 1 to {MAX_MEMBERS} members")
@@ -3435,10 +3440,12 @@ def check_machine(data: dict[str, Any], file: str) -> Report:
             where = f"{member.name}: " if len(names) > 1 else ""
             return Report(file, 1, f"not proved: {where}{member.failed}", made)
         members.append(member)
-    return check_together(data, members, made, file)
+    return check_together(data, members, made, file, recorded)
 
 
-def check_together(data: dict[str, Any], members: list[Member], made: list[Obligation], file: str) -> Report:
+def check_together(
+    data: dict[str, Any], members: list[Member], made: list[Obligation], file: str, recorded: bool
+) -> Report:
     """What joins the members: guarantees, coupling, observers; and the bound on the output."""
     WORK.begin(MAX_COUPLED)
     observing = data["study"]["controller"].get("observer") is not None
@@ -3454,7 +3461,13 @@ def check_together(data: dict[str, Any], members: list[Member], made: list[Oblig
     proved = {"tracking_error_m": members[0].claim.ultimate[0] if coupling is None else coupling.stated}
     if len(members) > 1:
         proved |= {f"member_error.{m.name}": m.claim.ultimate[0] for m in members}
-    met(data, proved)
+    records = ""
+    try:
+        met(data, proved)
+    except UnreadableError as error:
+        if recorded:
+            raise
+        records = str(error)
     reach = [member.claim.half_widths[0] for member in members]
     inside = reach[0] if coupling is None else coupling.output(reach)
     need(0 <= number(data["validation"]["largest_error_m"], "largest_error_m"), "an error must not be negative")
@@ -3465,7 +3478,7 @@ def check_together(data: dict[str, Any], members: list[Member], made: list[Oblig
     of = "" if coupling is None else f" of the output, all {len(members)} members together"
     message = f"proved: |tracking error{of}| <= {bound} from {settled} s on"
     used = [use for member in members for use in member.used]
-    return Report(file, 0, message, made, used, *unsourced(data), data["study"]["plant"]["model"])
+    return Report(file, 0, message, made, used, *unsourced(data), data["study"]["plant"]["model"], records)
 
 
 def unsourced(data: dict[str, Any]) -> tuple[list[str], list[str]]:

@@ -15,10 +15,13 @@ from .statuses import PROVED
 if TYPE_CHECKING:
     from ..problem import Problem
 
+#: Shortest time between two rows of a reference as CSV, s.
+STEP = 0.001
+
 
 @click.command()
 @click.argument("study")
-@click.option("-o", "output", type=click.Path(path_type=Path), help="Write the reference as JSON.")
+@click.option("-o", "output", type=click.Path(path_type=Path), help="Write it: .json, or .csv of its points.")
 @ALLOW_CODE
 @QUIET_OPTION
 def command(study: str, output: Path | None, allow_code: bool) -> None:
@@ -28,6 +31,8 @@ def command(study: str, output: Path | None, allow_code: bool) -> None:
 
 def run(name: str, output: Path | None, allow_code: bool) -> int:
     """Build references or motions, show them, write them."""
+    from ..errors import InvalidInputError
+    from ..files.motions import document, table
     from ..files.seal import to_text
     from ..files.text import check_writable, write_text
     from ..problem import assemble
@@ -35,7 +40,10 @@ def run(name: str, output: Path | None, allow_code: bool) -> int:
 
     chosen = any_study_of(name, allow_code)
     if output is not None:
+        if output.suffix not in (".json", ".csv"):
+            raise InvalidInputError(f"a trajectory is named .json or .csv: got {output}; give -o another name")
         check_writable(output)
+    as_csv = output is not None and output.suffix == ".csv"
     if isinstance(chosen, Study):
         problem = assemble(chosen)
         click.echo(
@@ -43,11 +51,12 @@ def run(name: str, output: Path | None, allow_code: bool) -> int:
             f"{problem.duration:.4g} s"
         )
         _members(problem)
-        data = _references(problem)
+        text = _csv(problem) if as_csv else to_text(_references(problem))
     else:
-        data = _motion(chosen)
+        ways = _motion(chosen)
+        text = table(ways) if as_csv else to_text(document(chosen, ways))
     if output is not None:
-        write_text(output, to_text(data))
+        write_text(output, text)
         click.echo(str(output))
     return PROVED
 
@@ -84,12 +93,36 @@ def _members(problem: Problem) -> None:
         )
 
 
-def _motion(chosen: Any) -> dict[str, Any]:
+def _csv(problem: Problem) -> str:
+    """References of all members at their control instants; the header carries the units."""
+    import csv
+    import io
+
+    import numpy as np
+
+    t = np.arange(0.0, problem.duration, max(problem.period, STEP))
+    columns: dict[str, Any] = {"time [s]": t}
+    for member in problem.members:
+        prefix = f"{member.name} " if len(problem.members) > 1 else ""
+        for what, unit, row in zip(
+            ("position", "speed", "acceleration", "jerk"),
+            member.plant.reference_units,
+            member.reference(t),
+            strict=True,
+        ):
+            columns[f"{prefix}{what} [{unit}]"] = row
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(np.asarray(values).tolist() for values in columns.values()), strict=True))
+    return text.getvalue()
+
+
+def _motion(chosen: Any) -> Any:
     """The motions of a study without a controller."""
     from trajectories import LimitViolatedError
 
     from ..errors import InvalidInputError
-    from ..files.motions import document
     from ..motions.crane_task import ASSUMED
     from ..motions.from_study import motions_of
     from .progress import bar
@@ -110,4 +143,4 @@ def _motion(chosen: Any) -> dict[str, Any]:
         )
     click.echo("every motion is inside its limits for all t", err=True)
     click.echo(f"assumed, to be replaced by yours: {', '.join(ASSUMED)}", err=True)
-    return document(chosen, ways)
+    return ways

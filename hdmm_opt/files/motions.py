@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from trajectories import Motion
 
@@ -13,6 +17,8 @@ from ..motions.sequence import Job, Motions
 from ..study.motion import MotionStudy
 
 SCHEMA = "hdmm-opt/motions/1"
+#: Time between two points of a joint trajectory, s.
+STEP = 0.02
 
 
 def document(study: MotionStudy, ways: Sequence[Motions]) -> dict[str, Any]:
@@ -41,7 +47,7 @@ def document(study: MotionStudy, ways: Sequence[Motions]) -> dict[str, Any]:
 
 
 def _move(job: Job, motion: Motion, payload: float) -> dict[str, Any]:
-    quantities, peaks = drive_quantities(payload, job.obstacles), motion.peaks
+    quantities, peaks = drive_quantities(payload, job.obstacles, job.bounds), motion.peaks
     assert peaks is not None
     rows = zip(
         quantities.names, quantities.units, peaks.lower, peaks.upper, quantities.lower, quantities.upper, strict=True
@@ -49,6 +55,7 @@ def _move(job: Job, motion: Motion, payload: float) -> dict[str, Any]:
     return {
         "payload_kg": payload,
         "arrivals_s": list(motion.arrivals),
+        "points": _points(motion),
         "degree": motion.spline.degree,
         "knots_s": motion.spline.knots.tolist(),
         "control_points": motion.spline.coefficients.tolist(),
@@ -58,6 +65,35 @@ def _move(job: Job, motion: Motion, payload: float) -> dict[str, Any]:
             for name, unit, low, high, least, most in rows
         ],
     }  # fmt: skip
+
+
+def _points(motion: Motion) -> list[dict[str, Any]]:
+    """A joint trajectory: positions, velocities and accelerations every `STEP` and at every waypoint, which says so."""
+    passed = {0.0: 0, **{float(t): k for k, t in enumerate(motion.arrivals, 1)}}
+    times = sorted({*passed, *np.arange(0.0, motion.spline.end - motion.spline.start, STEP).tolist()})
+    at = motion.spline.start + np.array(times)
+    rows = zip(times, *(motion.spline(at, order).tolist() for order in range(3)), strict=True)
+    return [
+        {"time_from_start_s": t, "positions": x, "velocities": v, "accelerations": a, "waypoint": passed.get(t)}
+        for t, x, v, a in rows
+    ]
+
+
+def table(ways: Sequence[Motions]) -> str:
+    """The points of all motions as CSV; the header carries the units."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    orders = (("position", ""), ("speed", "/s"), ("acceleration", "/s^2"))
+    joints = list(zip(JOINTS, ("rad", "rad", "m"), strict=True))
+    heads = [f"{joint} {what} [{unit}{per}]" for what, per in orders for joint, unit in joints]
+    writer.writerow(["motion", "move", "time [s]", "waypoint", *heads])
+    for way in ways:
+        for k, motion in enumerate(way.motions, 1):
+            for p in _points(motion):
+                numbers = [*p["positions"], *p["velocities"], *p["accelerations"]]
+                passed = "" if p["waypoint"] is None else p["waypoint"]
+                writer.writerow([way.name, k, p["time_from_start_s"], passed, *numbers])
+    return text.getvalue()
 
 
 def _known(value: float) -> float | None:

@@ -107,6 +107,8 @@ def finished(
     spent = {"evaluations": tuned.evaluations, "search_runs": tuned.runs}
     made = provenance(seed, options.jobs, "full" if options.full else "quick", spent, begun)
     proved, report = prove({**document, "provenance": made})
+    if report.records and not shown.missed:
+        raise DefectError(f"{report.records}; no file was written, please report this study")
     accepted = report.status == 0 and not shown.missed
     told = (*notes, _rates(problem, tuned)) if accepted and kept is None else notes
     return Design(

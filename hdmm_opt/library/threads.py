@@ -16,9 +16,10 @@ def alone(function: Callable[P, R]) -> Callable[P, R]:
     @wraps(function)
     def inside(*args: P.args, **kwargs: P.kwargs) -> R:
         import numpy as np
+        import scipy.linalg
         from threadpoolctl import threadpool_limits
 
-        _ = np  # its libraries must be there to be limited
+        _ = np, scipy.linalg  # each brings a library of its own, which must be there to be limited
         with threadpool_limits(limits=1):
             return function(*args, **kwargs)
 

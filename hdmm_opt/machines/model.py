@@ -126,7 +126,7 @@ def check_parameters(
             raise RefusedKeyError(f"{where}.{name}", f"is not a parameter of {what}", nearest(name, known))
         if p.unit != known[name].unit:
             rule = f'must be "{known[name].unit}": got "{p.unit}"'
-            raise RefusedKeyError(f"{where}.{name}.unit", rule, "convert the value")
+            raise RefusedKeyError(f"{where}.{name}.unit", rule, f"convert the value: {known[name].meaning}")
         if known[name].loss and not p.value >= 0:
             raise RefusedKeyError(f"{where}.{name}.value", f"must be 0 or more: got {p.value:g}", "correct the sign")
         if known[name].value > 0 and not known[name].loss and not p.value > 0:
@@ -143,8 +143,8 @@ def check_numbers(where: str, section: Any, plant: Plant, *, stroke: bool = True
         stroke: Whether the section may give a stroke.
     """
     for kind, what, known in (
-        ("limits", "limit", {limit.name: limit.unit for limit in plant.limits}),
-        ("ratings", "rating", {name: p.unit for name, p in plant.ratings.items()}),
+        ("limits", "limit", {limit.name: (limit.unit, f"of {', '.join(limit.signals)}") for limit in plant.limits}),
+        ("ratings", "rating", {name: (p.unit, p.meaning) for name, p in plant.ratings.items()}),
     ):
         for name, entry in getattr(section, kind).items():
             if name not in known:
@@ -152,9 +152,10 @@ def check_numbers(where: str, section: Any, plant: Plant, *, stroke: bool = True
                 rule = f"is not a {what} of this plant" + (f", but one of its {elsewhere}" if elsewhere else "")
                 remedy = f"write plant.{elsewhere}.{name}" if elsewhere else nearest(name, known)
                 raise RefusedKeyError(f"{where}{kind}.{name}", rule, remedy)
-            if entry.unit != known[name]:
-                rule = f'must be "{known[name]}": got "{entry.unit}"'
-                raise RefusedKeyError(f"{where}{kind}.{name}.unit", rule, "convert the value")
+            unit, meaning = known[name]
+            if entry.unit != unit:
+                rule = f'must be "{unit}": got "{entry.unit}"'
+                raise RefusedKeyError(f"{where}{kind}.{name}.unit", rule, f"convert the value: {meaning}")
     for unit, key in STROKE.items():
         given = getattr(section, key)
         if given is not None and (not stroke or unit != plant.state_units[0]):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any
 
@@ -26,6 +28,10 @@ ASSUMED = (
 )  # fmt: skip
 
 
+#: Name and unit of the squared speed and acceleration of the tool.
+SQUARES = (("squared speed of the tool", "m^2/s^2"), ("squared acceleration of the tool", "m^2/s^4"))
+
+
 @cache
 def tool_function() -> ca.Function:
     """Place of the tool in the plane of the crane, m, at joint coordinates. Shapes (3,) -> (2,)."""
@@ -33,28 +39,70 @@ def tool_function() -> ca.Function:
     return ca.Function("tool", [w], [ca.vertcat(*tool(w))])
 
 
+@dataclass(frozen=True, kw_only=True)
+class Bounded:
+    """Limits of a job in place of the crane's.
+
+    Attributes:
+        speed, acceleration, jerk: Of lift, tilt, telescope, rad and m. Each shape (3,), or None.
+        drives: Of every EMLA by name: "force", "motor speed", "motor torque", "current", "voltage".
+        tool: Largest speed, m/s, and acceleration, m/s², of the tool; infinite for none.
+    """
+
+    speed: tuple[float, float, float] | None = None
+    acceleration: tuple[float, float, float] | None = None
+    jerk: tuple[float, float, float] | None = None
+    drives: tuple[tuple[str, float], ...] = ()
+    tool: tuple[float, float] = (math.inf, math.inf)
+
+    @property
+    def joints(self) -> dict[str, tuple[float, float, float]]:
+        """Those of the joints that are given."""
+        own = {name: getattr(self, name) for name in ("speed", "acceleration", "jerk")}
+        return {name: value for name, value in own.items() if value is not None}
+
+
+def tool_rates(w: Any, v: Any, a: Any) -> list[Any]:
+    """Squared speed, m²/s², and squared acceleration, m²/s⁴, of the tool: a norm has no slope at rest."""
+    place = ca.vertcat(*tool(w))
+    speed = ca.jtimes(place, w, v)
+    gain = ca.jtimes(speed, w, v) + ca.jtimes(speed, v, a)
+    return [ca.sumsqr(speed), ca.sumsqr(gain)]
+
+
 @lru_cache(maxsize=32)
-def drive_quantities(payload: float = 0.0, obstacles: tuple[Obstacle, ...] = ()) -> Quantities:
+def drive_quantities(
+    payload: float = 0.0, obstacles: tuple[Obstacle, ...] = (), bounds: Bounded | None = None
+) -> Quantities:
     """Forces, motor speeds, torques, currents and voltages of the EMLAs, and the tool's clearance from obstacles.
 
     Args:
         payload: Mass at the tool, kg, beside the end mass.
         obstacles: What the tool keeps clear of.
+        bounds: Limits in place of the crane's, and those of the tool.
     """
+    bounds = bounds or Bounded()
     w, v, a, j = symbols = [ca.SX.sym(name, 3) for name in "wvaj"]
     found = drives(w, v, a, j, payload)
     columns = (found.force, found.speed, found.torque, found.current, found.voltage)
     clear = [obstacle.clearance(tool(w)) for obstacle in obstacles]
-    column = ca.Function("drives", symbols, [ca.densify(ca.vertcat(*columns, *clear))])
-    limits = drive_limits()
+    kinds = [k for k, size in enumerate(bounds.tool) if math.isfinite(size)]
+    rates = [tool_rates(w, v, a)[k] for k in kinds]
+    column = ca.Function("drives", symbols, [ca.densify(ca.vertcat(*columns, *clear, *rates))])
+    given = dict(bounds.drives)
+    limits = [(name, unit, given.get(name, size)) for name, unit, size in drive_limits()]
     names = [f"{joint} {name}" for name, _, _ in limits for joint in JOINTS]
     sizes = np.repeat([limit for _, _, limit in limits], len(JOINTS))
     return Quantities(
         function=column,
-        names=(*names, *(f"clearance of {obstacle.name}" for obstacle in obstacles)),
-        units=(*(unit for _, unit, _ in limits for _ in JOINTS), *("m" for _ in obstacles)),
-        lower=np.concatenate([-sizes, np.zeros(len(obstacles))]),
-        upper=np.concatenate([sizes, np.full(len(obstacles), np.inf)]),
+        names=(*names, *(f"clearance of {obstacle.name}" for obstacle in obstacles), *(SQUARES[k][0] for k in kinds)),
+        units=(
+            *(unit for _, unit, _ in limits for _ in JOINTS),
+            *("m" for _ in obstacles),
+            *(SQUARES[k][1] for k in kinds),
+        ),
+        lower=np.concatenate([-sizes, np.zeros(len(obstacles)), np.full(len(kinds), -np.inf)]),
+        upper=np.concatenate([sizes, np.full(len(obstacles), np.inf), [bounds.tool[k] ** 2 for k in kinds]]),
         enclose=enclosure(column),
     )
 
@@ -84,18 +132,24 @@ def crane_cost(*, time: float = 1.0, jerk: float = 0.0, payload: float = 0.0, **
 
 
 def crane_task(
-    waypoints: Sequence[Any], *, payload: float = 0.0, obstacles: Sequence[Obstacle] = (), **options: Any
-) -> Task:
+    waypoints: Sequence[Any], *, payload: float = 0.0, obstacles: Sequence[Obstacle] = (),
+    bounds: Bounded | None = None, **options: Any,
+) -> Task:  # fmt: skip
     """A motion of the crane from rest to rest.
 
     Args:
         waypoints: Joint coordinates, shape (3,), or whole `Waypoint`s.
         payload: Mass at the tool, kg, beside the end mass.
         obstacles: What the tool keeps clear of.
+        bounds: Limits in place of the crane's, and those of the tool.
         options: Further entries of `trajectories.Task`.
     """
     places = tuple(p if isinstance(p, Waypoint) else Waypoint(value=np.asarray(p, dtype=float)) for p in waypoints)
     return Task(
         waypoints=places,
-        **{"limits": joint_limits(), "quantities": drive_quantities(float(payload), tuple(obstacles)), **options},
+        **{
+            "limits": joint_limits(),
+            "quantities": drive_quantities(float(payload), tuple(obstacles), bounds),
+            **options,
+        },
     )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from trajectories import Ball, HalfSpace, Obstacle
 
-from ..study.motion import MotionStudy, ObstacleSection
-from .crane_task import crane_cost
+from ..study.motion import LimitsSection, MotionStudy, ObstacleSection
+from .crane_task import Bounded, crane_cost
 from .sequence import Job, Motions, Move, carried_out
 from .two_level import bilevel
 
@@ -21,12 +22,32 @@ def job_of(study: MotionStudy) -> Job:
     return Job(
         start=section.start_rad_rad_m,
         moves=tuple(
-            Move(tool=m.tool_m, joints=m.joints_rad_rad_m, via=m.via_m, payload=m.payload_kg) for m in section.moves
+            Move(
+                tool=m.tool_m,
+                joints=m.joints_rad_rad_m,
+                payload=m.payload_kg,
+                via=tuple(p.joints_rad_rad_m or p.tool_m or () for p in m.via),
+            )
+            for m in section.moves
         ),
         obstacles=tuple(_obstacle(entry) for entry in section.obstacles),
         longest=section.longest_s,
         least_lever=study.plant.least_lever_m_rad,
+        bounds=_bounds(section.limits),
     )
+
+
+def _bounds(limits: LimitsSection) -> Bounded:
+    drives = {
+        "force": limits.rod_force_n, "motor speed": limits.motor_speed_rad_s, "motor torque": limits.motor_torque_nm,
+        "current": limits.current_a, "voltage": limits.voltage_v,
+    }  # fmt: skip
+    tool = (limits.tool_speed_m_s, limits.tool_acceleration_m_s2)
+    return Bounded(
+        speed=limits.speed_rad_rad_m_s, acceleration=limits.acceleration_rad_rad_m_s2, jerk=limits.jerk_rad_rad_m_s3,
+        drives=tuple((name, value) for name, value in drives.items() if value is not None),
+        tool=(tool[0] or math.inf, tool[1] or math.inf),
+    )  # fmt: skip
 
 
 def _obstacle(section: ObstacleSection) -> Obstacle:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +15,7 @@ from trajectories import LimitViolatedError, Motion, MotionLimits, Obstacle, Tas
 from ..errors import InvalidInputError
 from ..machines.crane_geometry import apart, reach
 from ..machines.crane_limits import COSTS, LEAST_LEVER, joint_limits
-from .crane_task import crane_task, running_costs, tool_function
+from .crane_task import Bounded, crane_task, running_costs, tool_function
 
 Array = NDArray[np.float64]
 
@@ -32,13 +32,13 @@ class Move:
     Attributes:
         tool: Place of the tool, m, shape (2,); the joints are free to share the way. None where `joints` is given.
         joints: Joint coordinates, rad, rad, m, shape (3,).
-        via: Places of the tool that it passes without a stop, m. Shape (places, 2).
+        via: What it passes without a stop: places of the tool, m, shape (2,), or joint coordinates, shape (3,).
         payload: Mass at the tool, kg, beside the end mass.
     """
 
     tool: tuple[float, float] | None = None
     joints: tuple[float, float, float] | None = None
-    via: tuple[tuple[float, float], ...] = ()
+    via: tuple[tuple[float, ...], ...] = ()
     payload: float = 0.0
 
     def __post_init__(self) -> None:
@@ -56,6 +56,7 @@ class Job:
         obstacles: What the tool keeps clear of.
         longest: Longest admissible duration of a move, s.
         least_lever: Shortest admissible lever arm of the actuators of lift and tilt, m/rad.
+        bounds: Limits that the job has in place of the crane's, and those of the tool.
     """
 
     start: tuple[float, float, float]
@@ -63,15 +64,19 @@ class Job:
     obstacles: tuple[Obstacle, ...] = ()
     longest: float = 60.0
     least_lever: float = LEAST_LEVER
+    bounds: Bounded = field(default_factory=Bounded)
 
     def task(self, waypoints: Sequence[Any], payload: float, **options: Any) -> Task:
         """A move of the job as a task."""
-        return crane_task(waypoints, payload=payload, obstacles=self.obstacles, limits=self.limits, **options)
+        return crane_task(
+            waypoints, payload=payload, obstacles=self.obstacles, limits=self.limits, bounds=self.bounds, **options
+        )
 
     @cached_property
     def limits(self) -> MotionLimits:
         """Limits of the joints."""
-        return joint_limits(self.least_lever)
+        own = {name: np.array(v) for name, v in self.bounds.joints.items()}
+        return replace(joint_limits(self.least_lever), **own)
 
     def near(self, place: Sequence[float], at: Array) -> Array:
         """Joint coordinates at a place of the tool, the nearest to given ones of a few extensions.
@@ -149,9 +154,16 @@ def _going_somewhere(job: Job, move: Move, at: Array) -> None:
     if move.joints is not None and not move.via and float(np.abs(np.array(move.joints) - at).max()) < NOWHERE:
         raise ValueError(f"the joints go from one place to another: they are at {list(move.joints)} already")
     places = [*move.via, *([] if move.tool is None else [move.tool])]
-    if places and apart(at, places[0]) < NOWHERE:
-        raise ValueError(f"the tool goes from one place to another: it is at {list(places[0])} m already")
+    before: Sequence[float] | None = None
     for place in places:
+        there = apart(at, place) < NOWHERE if before is None and len(place) == 2 else before == place
+        if before is None and len(place) == 3:
+            there = float(np.abs(np.array(place) - at).max()) < NOWHERE
+        if there:
+            what = "tool goes" if len(place) == 2 else "joints go"
+            raise ValueError(f"the {what} from one place to another: at {list(place)} already, or twice in a row")
+        before = place
+    for place in [place for place in places if len(place) == 2]:
         for obstacle in job.obstacles:
             clear = float(obstacle.clearance(place))
             if clear < 0:
@@ -181,9 +193,14 @@ def carried_out(job: Job, cost: Callable[[float], Any], name: str, **options: An
         try:
             _going_somewhere(job, move, at)
             waypoints: list[Any] = [at]
+            last = at
             for place in move.via:
-                near = job.near(place, at if len(waypoints) == 1 else waypoints[-1].guess)
-                waypoints.append(Waypoint(value=np.array(place), through=tool_function(), near=near))
+                if len(place) == 3:
+                    last = np.array(place)
+                    waypoints.append(Waypoint(value=last))
+                    continue
+                last = job.near(place, last)
+                waypoints.append(Waypoint(value=np.array(place), through=tool_function(), near=last))
             if move.tool is not None:
                 near = job.near(move.tool, at)
                 waypoints.append(Waypoint(value=np.array(move.tool), through=tool_function(), near=near))

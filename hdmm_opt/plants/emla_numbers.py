@@ -15,7 +15,7 @@ MECHANICAL = {
         value=0.064,
         unit="m",
         source="derived",
-        meaning="pitch diameter of the screw, for a lead angle of 4.55 deg",
+        meaning="pitch diameter of the screw",
     ),
     "gear_ratio": Parameter(value=7.7, unit="1", source="table", meaning="turns of the motor per turn of the screw"),
     "screw_friction": Parameter(
@@ -47,7 +47,7 @@ MOTOR = {
     "pole_pairs": Parameter(value=4.0, unit="1", source="table", meaning="pole pairs of the motor"),
     "torque_constant": Parameter(
         value=6 * _FLUX, unit="N m/A", tolerance=0.03, source="derived",
-        meaning="torque per ampere of amplitude; per ampere RMS it is sqrt(2) times as large",
+        meaning="torque per ampere of amplitude: that per ampere RMS divided by sqrt(2)",
     ),
     "resistance": Parameter(value=0.08, unit="ohm", tolerance=0.2, source="table", meaning="phase resistance"),
     "inductance": Parameter(value=0.00242, unit="H", tolerance=0.05, source="table", meaning="phase inductance"),

@@ -209,7 +209,7 @@ def parameter_range(parameter: Parameter) -> Interval:
     """The assumed range of a parameter, rounded outwards; a point where the tolerance is zero."""
     if parameter.ends is not None:
         return Interval(*parameter.ends)
-    if parameter.tolerance == 0:
+    if parameter.tolerance == 0 or parameter.value == 0:
         return Interval(parameter.value)
     spread = abs(parameter.value) * parameter.tolerance
     return Interval(parameter.value) + Interval.symmetric(spread * (1 + 1e-15))

@@ -21,19 +21,42 @@ class CraneSection(Section):
     least_lever_m_rad: Annotated[float, Field(gt=0, le=0.25)] = LEAST_LEVER
 
 
-class MoveSection(Section):
-    """A move to a place of the tool, or to joint coordinates."""
+class PlaceSection(Section):
+    """A place of the tool, or joint coordinates."""
 
     tool_m: Pair | None = None
     joints_rad_rad_m: Triple | None = None
-    via_m: Annotated[tuple[Pair, ...], Field(max_length=10)] = ()
-    payload_kg: NonNegative = 0.0
 
     @model_validator(mode="after")
-    def _one_goal(self) -> MoveSection:
+    def _one_goal(self) -> PlaceSection:
         if (self.tool_m is None) == (self.joints_rad_rad_m is None):
             raise refused("", "needs either tool_m or joints_rad_rad_m", "give one of the two")
         return self
+
+
+class MoveSection(PlaceSection):
+    """A move to a place, by way of others that are passed without a stop."""
+
+    via: Annotated[tuple[PlaceSection, ...], Field(max_length=30)] = ()
+    payload_kg: NonNegative = 0.0
+
+
+Sizes = tuple[Positive, Positive, Positive]
+
+
+class LimitsSection(Section):
+    """Limits of a motion; what a study leaves out is the crane's. Of the three joints: lift, tilt, telescope."""
+
+    speed_rad_rad_m_s: Sizes | None = None
+    acceleration_rad_rad_m_s2: Sizes | None = None
+    jerk_rad_rad_m_s3: Sizes | None = None
+    rod_force_n: Positive | None = None
+    motor_speed_rad_s: Positive | None = None
+    motor_torque_nm: Positive | None = None
+    current_a: Positive | None = None
+    voltage_v: Positive | None = None
+    tool_speed_m_s: Positive | None = None
+    tool_acceleration_m_s2: Positive | None = None
 
 
 class ObstacleSection(Section):
@@ -81,6 +104,7 @@ class JobSection(Section):
     start_rad_rad_m: Triple
     longest_s: Positive = 60.0
     spans: Annotated[int, Field(ge=6, le=200)] = 24
+    limits: LimitsSection = LimitsSection()
     cost: CostSection | None = None
     evaluations: Annotated[int, Field(ge=2, le=10_000)] | None = None
     moves: Annotated[tuple[MoveSection, ...], Field(min_length=1, max_length=10)]
@@ -88,8 +112,8 @@ class JobSection(Section):
 
     @model_validator(mode="after")
     def _fitting(self) -> JobSection:
-        if self.kind == "bilevel" and (self.cost is not None or any(move.via_m for move in self.moves)):
-            raise refused("", 'has no cost and no via_m with kind = "bilevel"', 'remove them, or use kind = "bspline"')
+        if self.kind == "bilevel" and (self.cost is not None or any(move.via for move in self.moves)):
+            raise refused("", 'has no cost and no via with kind = "bilevel"', 'remove them, or use kind = "bspline"')
         if self.kind == "bspline" and self.evaluations is not None:
             raise refused("evaluations", 'has no place with kind = "bspline"', "remove it")
         return self
@@ -110,6 +134,12 @@ class MotionStudy(Section):
             (f"moves.{k}.joints_rad_rad_m", move.joints_rad_rad_m)
             for k, move in enumerate(self.reference.moves)
             if move.joints_rad_rad_m is not None
+        ]
+        given += [
+            (f"moves.{k}.via.{j}.joints_rad_rad_m", place.joints_rad_rad_m)
+            for k, move in enumerate(self.reference.moves)
+            for j, place in enumerate(move.via)
+            if place.joints_rad_rad_m is not None
         ]
         for key, place in given:
             for name, value, low, high in zip(JOINTS, place, low_ends, high_ends, strict=True):

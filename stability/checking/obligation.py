@@ -35,7 +35,7 @@ class Report:
     """The verdict on one file: status 0 proved, 1 not proved, 2 unreadable.
 
     `uses` are the shares of the limits, `bundled` what the study left to the bundled machine `model`, `assumed` what
-    has no source.
+    has no source, `records` what of a draft's records contradicts the study or the proof.
     """
 
     file: str
@@ -46,6 +46,7 @@ class Report:
     bundled: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
     model: str = ""
+    records: str = ""
 
 
 def decided(name: str, statement: str, margin: Fraction, unit: str, remedy: str, *, member: str = "",

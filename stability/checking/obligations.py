@@ -105,7 +105,11 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     effects = effects_of(claim, ranges)
     spare = {name: v / (LEAST_LOAD if name in claim.disturbances else LEAST_EFFECT) for name, v in effects.items()}
     weakest = min(spare, key=spare.__getitem__, default="")
-    loads = "".join(f"{name} moves its row by {percent(effects[name], up=False)}, " for name in claim.disturbances)
+    loads = "".join(
+        f"{name} moves its row by {percent(effects[name], up=False)}, "
+        for name in claim.disturbances
+        if name in effects
+    )
     statement = f"the plant feels everything that the study states: {loads}{weakest} is felt least"
     margin = min(spare.values(), default=Fraction(2)) - 1
     state("plant", statement, margin, "1", f"a plant that feels {weakest}")

@@ -19,7 +19,7 @@ from hdmm_opt.motions.sequence import Job, Move, carried_out
 from hdmm_opt.motions.two_level import bilevel
 from hdmm_opt.study import read as study
 from hdmm_opt.study.motion import MotionStudy
-from trajectories import Ball, LimitViolatedError, violations
+from trajectories import Ball, LimitViolatedError, Spline, violations
 
 START, PLACE = (0.2, -1.2, 0.2), (3.0, 2.2)
 JOB = Job(start=START, moves=(Move(tool=PLACE, payload=60.0),), longest=40.0)
@@ -104,7 +104,7 @@ time = 1.0
 effort = 0.5
 [[reference.moves]]
 tool_m = [3.0, 2.2]
-via_m = [[3.1, 1.2]]
+via = [{ tool_m = [3.1, 1.2] }]
 payload_kg = 60.0
 [[reference.moves]]
 joints_rad_rad_m = [0.2, -1.2, 0.2]
@@ -136,6 +136,54 @@ def test_a_study_of_moves_makes_motions_past_obstacles(tmp_path):
     assert ends[1] == pytest.approx(START) and len(job.obstacles) == 2
 
 
+LIMITED = """
+[study]
+name = "own-limits"
+[plant]
+model = "crane"
+[reference]
+kind = "bspline"
+start_rad_rad_m = [0.2, -1.2, 0.2]
+longest_s = 40.0
+spans = 12
+[reference.limits]
+speed_rad_rad_m_s = [0.3, 0.4, 0.1]
+current_a = 50.0
+tool_speed_m_s = 0.7
+[[reference.moves]]
+tool_m = [3.0, 2.2]
+via = [{ joints_rad_rad_m = [0.35, -1.0, 0.3] }, { tool_m = [3.1, 1.2] }]
+payload_kg = 60.0
+"""
+
+
+@pytest.mark.slow
+def test_a_motion_keeps_the_limits_of_its_study_and_says_when_it_passes_its_waypoints(tmp_path):
+    """Joint vias, own limits of joints, drives and tool, from the file alone; on 10,000 points by differences."""
+    path = tmp_path / "mine.toml"
+    path.write_text(LIMITED)
+    for ending in ("json", "csv"):
+        result = CliRunner().invoke(main, ["trajectory", str(path), "-o", str(tmp_path / f"mine.{ending}")])
+        assert result.exit_code == 0, result.output
+    (move,) = json.loads((tmp_path / "mine.json").read_text())["ways"][0]["moves"]
+    passed = {p["waypoint"]: p for p in move["points"] if p["waypoint"] is not None}
+    assert sorted(passed) == [0, 1, 2, 3] and [passed[k]["time_from_start_s"] for k in (1, 2, 3)] == move["arrivals_s"]
+    assert passed[1]["positions"] == pytest.approx([0.35, -1.0, 0.3], abs=1e-6)
+    assert np.array(tool_function()(passed[2]["positions"])).ravel() == pytest.approx((3.1, 1.2), abs=1e-6)
+    spline = Spline(knots=np.array(move["knots_s"]), coefficients=np.array(move["control_points"]))
+    t = np.linspace(0.0, spline.end, 10_000)
+    places = np.array(tool_function().map(t.size)(spline(t).T))
+    speed = np.linalg.norm(np.diff(places, axis=1), axis=0) / (t[1] - t[0])
+    assert speed.max() <= 0.7 * (1 + 1e-6) and speed.max() > 0.65  # the limit binds
+    assert (np.abs(np.diff(spline(t), axis=0) / (t[1] - t[0])).max(axis=0) <= [0.3, 0.4, 0.1]).all()
+    currents = [b for b in move["bounds"] if b["name"].endswith("current")]
+    assert all(b["upper_limit"] == 50.0 and b["upper"] <= 50.0 for b in currents) and len(currents) == 3
+    rows = (tmp_path / "mine.csv").read_text().splitlines()
+    assert (
+        rows[0].startswith("motion,move,time [s],waypoint,lift position [rad]") and len(rows) == len(move["points"]) + 1
+    )
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -143,7 +191,7 @@ def test_a_study_of_moves_makes_motions_past_obstacles(tmp_path):
         ("joints_rad_rad_m = [0.2", "joints_rad_rad_m = [2.5", r"reference\.moves\.1\.joints_rad_rad_m must keep the lift"),
         ("longest_s = 40.0", "longest = 40.0", 'did you mean "longest_s"'),
         ("longest_s = 40.0", "evaluations = 4", "evaluations has no place"),
-        ('kind = "bspline"', 'kind = "bilevel"', "has no cost and no via_m"),
+        ('kind = "bspline"', 'kind = "bilevel"', "has no cost and no via"),
         ("time = 1.0\neffort = 0.5", "time = 0.0", "needs one weight above zero"),
         ("radius_m = 0.3\n", "", "needs either centre_m and radius_m"),
         ("normal = [0.0, -1.0]", "normal = [0.0, -2.0]", "must have length 1"),
