@@ -89,8 +89,8 @@ def _sentence(document: Mapping[str, Any], problem: Problem, verdict: checker.Re
         return "no gain file was written. What failed, and what would help, stands below."
     if verdict.status:
         return verdict.message
-    what = "the rod" if problem.loads is None else "the tool"
-    what = what if problem.machine.planner != "axis" or problem.study.plant.model == "pmsm_emla" else "the output"
+    alone = "the rod" if problem.study.plant.model == "pmsm_emla" else "the output"
+    what = alone if problem.loads is None else "the tool"
     bound = f"{upward(1e3 * certified_of(document))} m{problem.machine.output_unit}"
     shown = document["validation"]
     late = 1e3 * shown["largest_error_after_transient_m"]

@@ -20,7 +20,6 @@ PLAIN = {
     "coupling": "together the members have one well-defined motion",
     "output": "the error of the tool is inside what the study requires",
     "observer": "the estimated speeds are good enough",
-    "uncertainty": "how much less uncertainty would be enough",
 }
 
 
