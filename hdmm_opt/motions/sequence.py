@@ -161,7 +161,7 @@ def _going_somewhere(job: Job, move: Move, at: Array) -> None:
             there = float(np.abs(np.array(place) - at).max()) < NOWHERE
         if there:
             what = "tool goes" if len(place) == 2 else "joints go"
-            raise ValueError(f"the {what} from one place to another: at {list(place)} already, or twice in a row")
+            raise ValueError(f"the {what} from one place to another: it is at {list(place)} already")
         before = place
     for place in [place for place in places if len(place) == 2]:
         for obstacle in job.obstacles:
