@@ -31,7 +31,6 @@ def command(study: str, output: Path | None, seed: int | None, jobs: int, budget
 
 def run(name: str, output: Path | None, options: Options, allow_code: bool) -> int:
     """Tune all, run all, show the table."""
-    from ..errors import InvalidInputError
     from ..files.seal import to_text
     from ..files.sources import assumed_text
     from ..files.text import check_writable, write_text
@@ -45,8 +44,6 @@ def run(name: str, output: Path | None, options: Options, allow_code: bool) -> i
     if output is not None:
         check_writable(output)
     problem, effort = assemble(study), effort_of(study, options)
-    if not problem.searched:
-        raise InvalidInputError(f"{name}: a comparison needs gains to search: all are fixed; give one min and max")
     budget = (effort.population, effort.iterations)
     with bar() as progress:
         found = compare(problem, budget, options.seed_of(study), options, progress)

@@ -82,7 +82,7 @@ def run(
             proved(result, verbose=verbose)
         state.unlink(missing_ok=True)
     if report is not None:
-        click.echo(f"report: {write_report(document, report)}", err=True)
+        click.echo(f"report: {write_report(document, report, result.report)}", err=True)
     if result.document is None:
         return NOT_PROVED
     click.echo(str(target))

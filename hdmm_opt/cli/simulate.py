@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import sys
 from collections.abc import Mapping
@@ -87,6 +85,8 @@ def _show(data: Mapping[str, Any], indent: str = "  ") -> None:
 
 def to_csv(problem: Problem, trace: Trace) -> str:
     """Signals as CSV, one row a control instant; the header carries the units."""
+    from ..files.text import csv_text
+
     several = len(problem.members) > 1
     columns: dict[str, Any] = {"time [s]": trace.t}
     for disturbance in problem.machine.disturbances:
@@ -103,8 +103,4 @@ def to_csv(problem: Problem, trace: Trace) -> str:
         columns |= {f"{prefix}{s} [{u}]": row for s, u, row in pairs}
         columns |= {f"{prefix}{s} [{plant.input_unit}]": row for s, row in zip(plant.inputs, own.u, strict=True)}
         columns |= {f"{prefix}theta_{k + 1}": row for k, row in enumerate(own.z)}
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
-    return text.getvalue()
+    return csv_text({name: values.tolist() for name, values in columns.items()})

@@ -16,9 +16,6 @@ from .statuses import NOT_PROVED, PROVED
 if TYPE_CHECKING:
     from ..jobs.options import Options
 
-#: Population and iterations of a quick trade-off of one member; those of the study where members are linked.
-QUICK = (32, 25)
-
 
 @click.command()
 @click.argument("study")
@@ -31,26 +28,18 @@ def command(study: str, output: Path | None, allow_code: bool, **given: Any) -> 
 
 def run(name: str, output: Path | None, options: Options, allow_code: bool) -> int:
     """Search the set, write it, show it."""
-    from ..errors import InvalidInputError
     from ..files.seal import to_text
     from ..files.text import write_text
     from ..jobs.evaluation import OBJECTIVES
-    from ..jobs.options import FULL
     from ..jobs.tradeoff import SCHEMA, rows, tradeoff
-    from ..problem import assemble
     from .outputs import json_target
     from .progress import bar
 
     chosen = study_of(name, allow_code)
-    problem = assemble(chosen)
-    if not problem.searched:
-        raise InvalidInputError(f"{name}: a trade-off needs gains to search: all are fixed; give one min and max")
     target = json_target(output, f"{chosen.study.name}.tradeoff.json", "a trade-off")
     state = target.with_name(f".{target.name}.state")
-    own = (chosen.tuning.population, chosen.tuning.iterations)
-    size = (FULL.population, FULL.iterations) if options.full else own if problem.linked else QUICK
     with bar() as progress:
-        found, kept = tradeoff(chosen, replace(options, state=state), progress, size)
+        found, kept = tradeoff(chosen, replace(options, state=state), progress)
     table = rows(found)
     document = {"schema": SCHEMA, "study": chosen.model_dump(mode="json", exclude_none=True), "rows": table}
     write_text(target, to_text(document))

@@ -95,10 +95,9 @@ def _members(problem: Problem) -> None:
 
 def _csv(problem: Problem) -> str:
     """References of all members at their control instants; the header carries the units."""
-    import csv
-    import io
-
     import numpy as np
+
+    from ..files.text import csv_text
 
     t = np.arange(0.0, problem.duration, max(problem.period, STEP))
     columns: dict[str, Any] = {"time [s]": t}
@@ -111,11 +110,7 @@ def _csv(problem: Problem) -> str:
             strict=True,
         ):
             columns[f"{prefix}{what} [{unit}]"] = row
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*(np.asarray(values).tolist() for values in columns.values()), strict=True))
-    return text.getvalue()
+    return csv_text({name: np.asarray(values).tolist() for name, values in columns.items()})
 
 
 def _motion(chosen: Any) -> Any:

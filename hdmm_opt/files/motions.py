@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,6 +13,7 @@ from ..machines.crane_dynamics import JOINTS
 from ..motions.crane_task import ASSUMED, drive_quantities
 from ..motions.sequence import Job, Motions
 from ..study.motion import MotionStudy
+from .text import csv_text
 
 SCHEMA = "hdmm-opt/motions/1"
 #: Time between two points of a joint trajectory, s.
@@ -81,19 +80,16 @@ def _points(motion: Motion) -> list[dict[str, Any]]:
 
 def table(ways: Sequence[Motions]) -> str:
     """The points of all motions as CSV; the header carries the units."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     orders = (("position", ""), ("speed", "/s"), ("acceleration", "/s^2"))
     joints = list(zip(JOINTS, ("rad", "rad", "m"), strict=True))
     heads = [f"{joint} {what} [{unit}{per}]" for what, per in orders for joint, unit in joints]
-    writer.writerow(["motion", "move", "time [s]", "waypoint", *heads])
-    for way in ways:
-        for k, motion in enumerate(way.motions, 1):
-            for p in _points(motion):
-                numbers = [*p["positions"], *p["velocities"], *p["accelerations"]]
-                passed = "" if p["waypoint"] is None else p["waypoint"]
-                writer.writerow([way.name, k, p["time_from_start_s"], passed, *numbers])
-    return text.getvalue()
+    rows = [
+        (way.name, k, p["time_from_start_s"], "" if p["waypoint"] is None else p["waypoint"],
+         *p["positions"], *p["velocities"], *p["accelerations"])
+        for way in ways for k, motion in enumerate(way.motions, 1) for p in _points(motion)
+    ]  # fmt: skip
+    names = ("motion", "move", "time [s]", "waypoint", *heads)
+    return csv_text(dict(zip(names, zip(*rows, strict=True), strict=True)))
 
 
 def _known(value: float) -> float | None:

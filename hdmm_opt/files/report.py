@@ -20,6 +20,7 @@ from .restore import restored
 from .seal import to_text
 from .sections import assumptions_data, gains_data
 from .sources import bundled_text
+from .statistics import clopper_pearson
 from .text import upward, write_text
 from .words import plain
 
@@ -42,12 +43,13 @@ def check_report() -> None:
         raise InvalidInputError("a report needs jinja2 and plotly: pip install jinja2 plotly") from None
 
 
-def write_report(document: Mapping[str, Any], folder: Path) -> Path:
-    """Write `report.html` for a gain file or for what a refused design left behind; a gain file is checked anew.
+def write_report(document: Mapping[str, Any], folder: Path, verdict: checker.Report | None = None) -> Path:
+    """Write `report.html` for a gain file or for what a refused design left behind.
 
     Args:
         document: The file.
         folder: An existing folder.
+        verdict: The checker's verdict on a gain file; where None it is checked here.
 
     Returns:
         The page.
@@ -60,7 +62,7 @@ def write_report(document: Mapping[str, Any], folder: Path) -> Path:
 
     problem, gains = restored(document)
     prefix = {m.name: f"{m.name}: " if len(problem.members) > 1 else "" for m in problem.members}
-    verdict = None if rejected(document) else checker.check_text(to_text(dict(document)))
+    verdict = None if rejected(document) else verdict or checker.check_text(to_text(dict(document)))
     proved = verdict is not None and verdict.status == 0
     made = pictures(document, problem, gains)
     text = Environment(autoescape=True).from_string(PAGE).render(
@@ -200,7 +202,12 @@ def _scenario(scenario: Mapping[str, Any]) -> list[tuple[str, str]]:
 def _drawn(document: Mapping[str, Any]) -> str:
     """How many of the random runs met every requirement."""
     found = document.get("validation", {}).get("monte_carlo")
-    return f"{found['met']:g} of {found['runs']:g} random runs met every requirement." if found else ""
+    if not found:
+        return ""
+    least = 100 * clopper_pearson(found["met"], found["runs"])["lower"]
+    return (
+        f"{found['met']:g} of {found['runs']:g} random runs met every requirement: 95 % sure of {least:.4g} % or more."
+    )
 
 
 def _obligations(verdict: checker.Report | None) -> list[dict[str, Any]]:

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 import tempfile
-from decimal import ROUND_CEILING, Context, Decimal
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
+
+from stability.checker import upward as upward
 
 from ..errors import InvalidInputError
 
 
-def upward(bound: float, digits: int = 4) -> str:
-    """A bound with few digits, not below it."""
-    return f"{float(Context(prec=digits, rounding=ROUND_CEILING).create_decimal(Decimal(bound))):.{digits}g}"
+def csv_text(columns: Mapping[str, Iterable[Any]]) -> str:
+    """Columns of one length as CSV; their names are the header."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return text.getvalue()
 
 
 def write_text(path: Path, text: str) -> None:

@@ -74,12 +74,14 @@ def compare(
         The law tuned by each method, then the rivals.
 
     Raises:
-        InvalidInputError: a plant that the rivals are not made for.
+        InvalidInputError: all gains are fixed, or a plant that the rivals are not made for.
 
     Not guaranteed: that any search found the best gains; all had the same number of candidates. The law's candidates
     must be proved besides; the rivals have no such constraint, and no certificate. A rival's gains are shared by all
     members, the law has its own for each.
     """
+    if not problem.searched:
+        raise InvalidInputError("a comparison needs gains to search: all are fixed; give one min and max")
     progress.stage("proof of a start")
     first = starting_point(problem, progress)
     found, loop = [], Loop(problem)

@@ -8,13 +8,14 @@ from typing import Any
 
 from tuning import Outcome, Population, front, pareto_jaya, start
 
+from ..errors import InvalidInputError
 from ..files.sections import named_gains
 from ..files.state import State
 from ..problem import GainSet, Problem, assemble
 from ..study import Study
 from .checkpoint import kept_population, to_data
 from .evaluation import OBJECTIVES, make_evaluator
-from .options import Options, Progress
+from .options import FULL, Options, Progress
 from .space import Window
 from .start import starting_point
 from .workers import workers
@@ -39,21 +40,34 @@ class Tradeoff:
     evaluations: int
 
 
-def tradeoff(study: Study, options: Options, progress: Progress, size: tuple[int, int]) -> tuple[Tradeoff, State]:
+#: Population and iterations of a quick trade-off of one member; those of the study where members are linked.
+QUICK = (32, 25)
+
+
+def tradeoff(
+    study: Study, options: Options, progress: Progress, size: tuple[int, int] | None = None
+) -> tuple[Tradeoff, State]:
     """Search the Pareto set of a study's gains by multi-objective JAYA.
 
     Args:
         study: A validated study with gains to search.
         options: Seed, workers, state.
         progress: Where to report.
-        size: Population and iterations.
+        size: Population and iterations; those of the budget where None.
+
+    Raises:
+        InvalidInputError: all gains are fixed.
 
     Returns:
         The set, and the state, to be removed once the set is safe. Certificates are searched, not checked exactly: a
         design that is to be used goes through `design` with its gains as values.
     """
     problem = assemble(study)
+    if not problem.searched:
+        raise InvalidInputError("a trade-off needs gains to search: all are fixed; give one min and max")
     seed = options.seed_of(study)
+    own = (study.tuning.population, study.tuning.iterations) if problem.linked else QUICK
+    size = size or ((FULL.population, FULL.iterations) if options.full else own)
     population, iterations = size
     job = {"tradeoff": study.model_dump(mode="json"), "seed": seed, "size": list(size)}
     state = State(options.state, job, resume=options.resume)

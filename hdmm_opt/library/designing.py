@@ -73,7 +73,6 @@ def compare(
     Raises:
         InvalidInputError: the study cannot be made concrete, or has no gains to search.
     """
-    from ..errors import InvalidInputError
     from ..jobs.compare import compare as run
     from ..jobs.options import effort_of
     from ..jobs.showing import bar
@@ -81,8 +80,6 @@ def compare(
 
     chosen, options = study_of(study), _options(seed, jobs, budget)
     problem, effort = assemble(chosen), effort_of(chosen, options)
-    if not problem.searched:
-        raise InvalidInputError(f"{chosen.study.name}: a comparison needs gains to search; give one min and max")
     with bar(quiet=quiet) as progress:
         found = run(problem, (effort.population, effort.iterations), options.seed_of(chosen), options, progress)
     rows = tuple(
@@ -150,17 +147,13 @@ def tradeoff(
     Raises:
         InvalidInputError: the study cannot be made concrete, or has no gains to search.
     """
-    from ..errors import InvalidInputError
     from ..jobs.evaluation import OBJECTIVES
     from ..jobs.options import Options
     from ..jobs.showing import bar
     from ..jobs.tradeoff import rows
     from ..jobs.tradeoff import tradeoff as run
-    from ..problem import assemble
 
     chosen = study_of(study)
-    if not assemble(chosen).searched:
-        raise InvalidInputError(f"{chosen.study.name}: a trade-off needs gains to search; give one min and max")
     with bar(quiet=quiet) as progress:
         found, _ = run(chosen, Options(seed=seed, jobs=jobs), progress, (population, iterations))
     table = rows(found)

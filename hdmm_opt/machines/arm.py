@@ -15,7 +15,7 @@ from ..names import nearest
 from ..plants import EFFECTIVENESS, Limit, Plant, effectiveness
 from ..plants.rigid_joint import UNITS, joint_parameters, rigid_joint
 from .machine import Disturbance, Machine
-from .model import STROKE, Model, no_place
+from .model import STROKE, Model, no_place, stroke_of
 from .rigid_body import Payload, inverse_dynamics, pose
 from .urdf import Body, bodies
 
@@ -100,11 +100,10 @@ def _driven(body: Body, name: str, section: Any, damping: float) -> Plant:
     widest = 2 * math.pi if body.kind == "revolute" else FARTHEST
     travel = (max(body.limits[0], -widest), min(body.limits[1], widest))
     plant = rigid_joint(body.kind, parameters, torque=limit, speed=speed.value, travel=travel)
-    strokes = [getattr(section, key) for key in STROKE.values() if getattr(section, key) is not None]
     return plant.with_values(
         parameters={} if section.least_effectiveness is None
         else {EFFECTIVENESS: effectiveness(section.least_effectiveness)},
-        stroke=strokes[-1] if strokes else None,
+        stroke=stroke_of(section),
     )  # fmt: skip
 
 

@@ -83,11 +83,10 @@ def _check(section: Any) -> None:
             rule = f"is a stroke from 0 to {STROKES[name]:g} m: got {stroke:g}"
             raise RefusedKeyError(f"locked.{name}", rule, "correct it")
     blank = pmsm_emla("voltage")
-    others = dict.fromkeys(blank.ratings, "ratings") | {limit.name: "limits" for limit in blank.limits}
-    check_parameters("parameters", section.parameters, known, "an EMLA of the crane", others)
+    check_parameters("parameters", section.parameters, known, "an EMLA of the crane", blank)
     check_numbers("", section, blank, stroke=False)
     for name, drive in section.joints.items():
-        check_parameters(f"joints.{name}.parameters", drive.parameters, known, "an EMLA of the crane", others)
+        check_parameters(f"joints.{name}.parameters", drive.parameters, known, "an EMLA of the crane", blank)
         check_numbers(f"joints.{name}.", drive, blank)
         if drive.least_effectiveness is not None:
             raise RefusedKeyError(f"joints.{name}.least_effectiveness", "has no place at voltage level", "remove it")

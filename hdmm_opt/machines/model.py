@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any
 
 from ..errors import RefusedKeyError
@@ -68,10 +67,9 @@ class Numbers:
         """The numbers of a member of a `[plant]` section."""
         own = section.joints.get(member)
         parts = (section,) if own is None else (section, own)
-        strokes = [getattr(part, key) for part in parts for key in STROKE.values() if getattr(part, key) is not None]
         return Numbers(
             *({name: entry for part in parts for name, entry in getattr(part, kind).items()} for kind in KINDS),
-            stroke=strokes[-1] if strokes else None,
+            stroke=stroke_of(*parts),
             least=None if own is None else own.least_effectiveness, bundled=None if own is None else own.bundled,
         )  # fmt: skip
 
@@ -91,6 +89,12 @@ class Numbers:
         return (*found, *(() if self.stroke else ("stroke",)))
 
 
+def stroke_of(*sections: Any) -> tuple[float, float] | None:
+    """The stroke that the last of some sections gives, or None."""
+    given = [getattr(section, key) for section in sections for key in STROKE.values()]
+    return next((stroke for stroke in reversed(given) if stroke is not None), None)
+
+
 #: Kinds of numbers that a study gives by name.
 KINDS = ("parameters", "ratings", "limits")
 
@@ -107,7 +111,7 @@ def numbers_of(plant: Plant, given: Numbers) -> Plant:
 
 def check_parameters(
     where: str, parameters: Mapping[str, Any], known: Mapping[str, Parameter], what: str,
-    others: Mapping[str, str] = MappingProxyType({}),
+    plant: Plant,
 ) -> None:  # fmt: skip
     """Refuse parameters that a plant does not have, in other units, or of the wrong sign.
 
@@ -116,13 +120,14 @@ def check_parameters(
         parameters: Its entries.
         known: The parameters of the plant.
         what: The plant, for messages.
-        others: Names of its other numbers, and the section that each belongs in.
+        plant: The plant with any numbers, for names that belong in another section.
     """
     for name, p in parameters.items():
         if name not in known or name == EFFECTIVENESS:
-            if name in others:
-                rule, remedy = f"is not a parameter of {what}, but one of its {others[name]}", f"plant.{others[name]}"
-                raise RefusedKeyError(f"{where}.{name}", rule, f"write {remedy}.{name}")
+            elsewhere = _elsewhere(name, plant)
+            if elsewhere not in ("", "parameters"):
+                rule = f"is not a parameter of {what}, but one of its {elsewhere}"
+                raise RefusedKeyError(f"{where}.{name}", rule, f"write plant.{elsewhere}.{name}")
             raise RefusedKeyError(f"{where}.{name}", f"is not a parameter of {what}", nearest(name, known))
         if p.unit != known[name].unit:
             rule = f'must be "{known[name].unit}": got "{p.unit}"'

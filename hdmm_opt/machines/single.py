@@ -35,11 +35,10 @@ def single(name: str, plant: PlantModel) -> Model:
                 raise RefusedKeyError(f"joints.{member}", "is not a member of this machine", nearest(member, [MEMBER]))
         known, own = plant.defaults(section.level), section.joints.get(MEMBER)
         blank = plant.build(section.level, {}, {})
-        others = dict.fromkeys(blank.ratings, "ratings") | {limit.name: "limits" for limit in blank.limits}
-        check_parameters("parameters", section.parameters, known, name, others)
+        check_parameters("parameters", section.parameters, known, name, blank)
         check_numbers("", section, blank)
         if own is not None:
-            check_parameters(f"joints.{MEMBER}.parameters", own.parameters, known, name, others)
+            check_parameters(f"joints.{MEMBER}.parameters", own.parameters, known, name, blank)
             check_numbers(f"joints.{MEMBER}.", own, blank)
             if own.least_effectiveness is not None and EFFECTIVENESS not in known:
                 rule = f'has no place with level = "{section.level}"'

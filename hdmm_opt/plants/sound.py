@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import Any
+
+from stability.checker import NAME, UNIT_TEXT
 
 from ..errors import InvalidInputError
 from .parameter import SOURCES, Parameter
@@ -12,8 +13,6 @@ from .plant import Plant
 
 #: Operations that the prover and the checker bound in a plant, as users know them.
 BOUNDED = ("add", "sub", "mul", "div", "neg", "sq", "sqrt", "tanh", "input", "const")
-_UNIT = re.compile(r"1|[A-Za-z]{1,4}(\^[2-4])?( [A-Za-z]{1,4}(\^[2-4])?){0,3}(/[A-Za-z]{1,4}(\^[2-4])?)?")
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 #: Units of a first state.
 FIRST = {"position": ("m", "rad"), "speed": ("m/s", "rad/s")}
 
@@ -38,7 +37,7 @@ def check_plant(plant: Any) -> Plant:
             raise _wrong(f"{what} must have {wanted} entries: got {count}", "complete it")
     names = [*plant.states, *plant.inputs, *plant.disturbances, *plant.parameters]
     for name in names:
-        if _NAME.fullmatch(name) is None or names.count(name) > 1:
+        if NAME.fullmatch(name) is None or names.count(name) > 1:
             raise _wrong(f"names must be different plain identifiers: got {name!r:.40}", "rename it")
     if plant.state_units[0] not in FIRST[plant.first]:
         wanted = " or ".join(FIRST[plant.first])
@@ -70,7 +69,7 @@ def check_parameters(parameters: Any) -> dict[str, Parameter]:
 
 
 def _check_tags(name: str, unit: str, source: str) -> None:
-    if not isinstance(unit, str) or _UNIT.fullmatch(unit) is None:
+    if not isinstance(unit, str) or UNIT_TEXT.fullmatch(unit) is None:
         raise _wrong(f'{name} needs a unit such as "kg m^2", "N m s/rad" or "1": got {unit!r:.20}', "correct it")
     if source not in SOURCES:
         raise _wrong(f"{name} needs a source, one of {', '.join(SOURCES)}: got {source!r:.20}", "choose one")

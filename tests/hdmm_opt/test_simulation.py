@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 
 from hdmm_opt import study
 from hdmm_opt.errors import InvalidInputError
+from hdmm_opt.files.statistics import clopper_pearson
 from hdmm_opt.jobs.certify import sampled
 from hdmm_opt.jobs.start import cascade
-from hdmm_opt.jobs.statistics import clopper_pearson
 from hdmm_opt.machines.rigid_body import Payload, inverse_dynamics
 from hdmm_opt.machines.urdf import bodies
 from hdmm_opt.plants import pmsm_emla
