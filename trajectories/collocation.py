@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,9 @@ from .limits import LimitViolatedError, violations
 from .nodes import POINTS, TIGHTENING, gauss
 from .program import Program, build
 from .quantity import Peaks, peaks
-from .solver import AGAIN, FLOOR, assembled, bounds, solver_of
+from .solver import AGAIN, FLOOR, NEAR, assembled, bounds, solver_of
 from .spline import Spline, clamped_knots
-from .task import Cost, Task
+from .task import Cost, Task, Waypoint
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,13 @@ FLOORS = 5
 GROWTHS = (1.0, 1.5, 3.0, 8.0)
 #: A motion longer than this, s, is not searched for.
 LONGEST = 1e4
+#: Where a search ends at this share of the longest admitted duration, the quickest motion is looked for first; where
+#: that takes so many times the admitted duration, no other start is tried.
+AT_THE_END, FAR_LONGER = 0.9, 1.2
+#: CPU time for finding out why there is no motion, and of one program of that, s.
+PATIENCE, ONE = 6.0, 4.0
+#: No other start is tried once the solver has taken so many iterations.
+ITERATIONS = 300
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,16 +92,41 @@ def solve(task: Task, begin: float = 0.0, guess: Guess | None = None) -> Motion:
     _reject_places(task)
     starts = guesses(task) if guess is None else iter([guess])
     first = _Attempt(task, next(starts))
-    motion, relaxation = first.run(), None
-    if motion is None:
+    motion, relaxation, shortest = first.run(), None, None
+    if motion is None and first.share > AT_THE_END:
+        shortest = _shortest(task, _Clock(PATIENCE))
+    if motion is None and not (shortest or 0.0) > FAR_LONGER * task.longest:
         relaxation = relaxed(task, first.start)
         known = [] if relaxation is None or relaxation.widened else [relaxation.guess]
-        tried = (_Attempt(task, start).run() for start in (*known, *starts))
-        motion = next((found for found in tried if found is not None), None)
+        motion = _elsewhere(task, (*known, *starts), first.iterations)
     if motion is None:
         crowded = relaxation is not None and relaxation.crowded
-        raise refusal(task, _reasons(task, relaxation), first.failure, _shortest(task), crowded=crowded)
+        raise refusal(task, _reasons(task, relaxation, _Clock(PATIENCE)), first.failure, shortest, crowded=crowded)
     return _from(motion, begin)
+
+
+def _elsewhere(task: Task, starts: tuple[Guess, ...], iterations: int) -> Motion | None:
+    """The first motion found from other starts."""
+    for start in starts:
+        if iterations > ITERATIONS:
+            return None
+        attempt = _Attempt(task, start)
+        motion = attempt.run()
+        if motion is not None:
+            return motion
+        iterations += attempt.iterations
+    return None
+
+
+class _Clock:
+    """CPU time that is left, s."""
+
+    def __init__(self, seconds: float) -> None:
+        self.end = process_time() + seconds
+
+    @property
+    def left(self) -> float:
+        return self.end - process_time()
 
 
 def _from(motion: Motion, begin: float) -> Motion:
@@ -102,20 +135,20 @@ def _from(motion: Motion, begin: float) -> Motion:
     return replace(motion, spline=spline, arrivals=tuple(begin + t for t in motion.arrivals))
 
 
-def _reasons(task: Task, relaxation: Relaxation | None) -> str:
+def _reasons(task: Task, relaxation: Relaxation | None, clock: _Clock) -> str:
     """What has to give way, and wider limits with which a motion was found and verified."""
     if relaxation is None or not relaxation.widened:
         return ""
     for growth in () if relaxation.crowded else GROWTHS:
-        if _Attempt(relaxation.task(task, growth), relaxation.guess).run() is not None:
+        if _Attempt(relaxation.task(task, growth), relaxation.guess, clock).run() is not None:
             return relaxation.text(growth)
     return relaxation.text(None)
 
 
-def _shortest(task: Task) -> float | None:
-    """Duration of the quickest motion inside the limits, s; None where none was found."""
+def _shortest(task: Task, clock: _Clock) -> float | None:
+    """Duration of the quickest motion inside the limits, s; None where none was found in the time that is left."""
     longer = replace(task, cost=Cost(), duration=None, longest=LONGEST)
-    motion = _Attempt(longer, straight(longer)).run()
+    motion = _Attempt(longer, straight(longer), clock).run()
     return None if motion is None else motion.parts["time"]
 
 
@@ -129,19 +162,36 @@ def _reject_places(task: Task) -> None:
                     f"{name} {value:g} {unit} leaves the stroke {low[k]:g}…{high[k]:g} {unit}; move the waypoint"
                 )
     for which, waypoint in (("start", task.waypoints[0]), ("goal", task.waypoints[-1])):
-        if not np.isnan(waypoint.known).any():
+        if waypoint.moving:
+            _reject_rates(task, which, waypoint)
+        elif not np.isnan(waypoint.known).any():
             over = at_rest(task, waypoint.known)
             if over:
                 raise LimitViolatedError(f"no motion: at rest at the {which}, {over}")
 
 
-class _Attempt:
-    """One search from one guess."""
+def _reject_rates(task: Task, which: str, waypoint: Waypoint) -> None:
+    """A speed or an acceleration at an end that is over its limit."""
+    for order in (1, 2):
+        sizes, limits = np.abs(waypoint.rate(order, len(task.limits.names))), task.limits.of(order)
+        over = np.flatnonzero(sizes > limits * (1 - TIGHTENING / 2))
+        if len(over):
+            k = int(over[0])
+            raise LimitViolatedError(
+                f"no motion: at the {which}, {task.limits.title(order, k)} is {sizes[k]:g} {task.limits.unit(order, k)}, "
+                f"its limit {limits[k]:g} {task.limits.unit(order, k)} less {50 * TIGHTENING:g} % in reserve: start it "
+                "slower, or widen that limit"
+            )
 
-    def __init__(self, task: Task, start: Guess) -> None:
-        self.task, self.start = task, start
+
+class _Attempt:
+    """One search from one guess, with a clock in the CPU time that is left."""
+
+    def __init__(self, task: Task, start: Guess, clock: _Clock | None = None) -> None:
+        self.task, self.start, self.clock = task, start, clock
         self.iterations = 0
         self.failure = ""
+        self.share = 0.0  # of the longest admitted duration, where the last search ended
 
     def run(self) -> Motion | None:
         """The motion from time 0; None where none was found, and `failure` says why."""
@@ -159,19 +209,23 @@ class _Attempt:
         """Solve, verify and tighten; and whether a duration ended at its lower bound."""
         task = self.task
         size = _first_cost(task, start)
-        program = build(task, 1.0 / size if size > 0 else 1.0)
-        solver, again = solver_of(program), None
+        program, scale = build(task), 1.0 / size if size > 0 else 1.0
+        hurry = () if self.clock is None else (("max_cpu_time", ONE),)
+        solver = solver_of(program, (*hurry, *(NEAR if start.near else ())))
         x = program.shape.packed(list(start.points), start.durations)
-        upper, lower = program.upper.copy(), program.lower.copy()
+        lower, upper = program.rows(task)
         known: dict[str, Any] = {}
         for rounds in range(1, ROUNDS + 1):
-            answer = solver(x0=x, lbg=lower, ubg=upper, **bounds(task, program, start), **known)
+            if self.clock is not None and self.clock.left < 0:
+                return None, False
+            answer = solver(x0=x, p=scale, lbg=lower, ubg=upper, **bounds(task, program, start), **known)
             self.iterations += solver.stats()["iter_count"]
             x = np.array(answer["x"]).ravel()
+            durations = program.shape.unpacked(x)[1]
+            self.share = durations.sum() / task.longest if task.duration is None else 1.0
             if not solver.stats()["success"]:
                 self.failure = str(solver.stats()["return_status"])
                 return None, False
-            durations = program.shape.unpacked(x)[1]
             if task.duration is None and (durations < 1.5 * FLOOR * start.durations).any():
                 return None, True
             spline, arrivals = assembled(task, program.shape, x)
@@ -183,7 +237,7 @@ class _Attempt:
             if found is None or found.inside:
                 return None, False
             _tighten(task, program, found, lower, upper)
-            solver = again = again or solver_of(program, **AGAIN)
+            solver = solver_of(program, (*hurry, *AGAIN))
             known = {"lam_x0": answer["lam_x"], "lam_g0": answer["lam_g"]}
         return None, False
 

@@ -113,11 +113,12 @@ def at_rest(task: Task, place: Array) -> str:
 
 def relaxed(task: Task, start: Guess) -> Relaxation | None:
     """Solve the program in which every limit may give way, for the least sum of widenings; None where that fails."""
-    program = build(task, 1.0, relaxed=True)
+    program = build(task, relaxed=True)
     solver = solver_of(program)
     x = program.shape.packed(list(start.points), start.durations)
     x[program.shape.size - program.shape.slacks :] = 1.0
-    answer = solver(x0=x, lbg=program.lower, ubg=program.upper, **bounds(task, program, start))
+    lower, upper = program.rows(task)
+    answer = solver(x0=x, p=1.0, lbg=lower, ubg=upper, **bounds(task, program, start))
     if not solver.stats()["success"]:
         return None
     x = np.array(answer["x"]).ravel()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .limits import ORDERS
 from .quintic import law, shortest_duration
-from .spline import clamped_knots, fitted
+from .spline import Spline, clamped_knots, fitted
 from .task import Task
 
 Array = NDArray[np.float64]
@@ -31,10 +31,12 @@ class Guess:
     Attributes:
         points: Control points of every phase. Each shape (k, n).
         durations: Durations of the phases, s. Shape (phases,).
+        near: Whether a motion inside the limits is close by: the search then stays there.
     """
 
     points: tuple[Array, ...]
     durations: Array
+    near: bool = False
 
 
 def unit_times(task: Task) -> Array:
@@ -46,6 +48,35 @@ def fitted_controls(task: Task, values: Array) -> Array:
     """Control points of a phase, inside the ranges of the coordinates, from samples at `unit_times`, shape (m, n)."""
     knots = clamped_knots(0.0, 1.0, task.spans, task.degree)
     return np.clip(fitted(unit_times(task), values, knots, task.degree).coefficients, *task.limits.room)
+
+
+def moving_ends(task: Task, points: Array, duration: float, phase: int) -> Array:
+    """Control points of a phase, the first and the last ones those of the speeds and accelerations of its waypoints."""
+    found, count, degree = points.copy(), points.shape[1], task.degree
+    for number, order in ((0, 1), (task.phases, -1)):
+        waypoint = task.waypoints[number]
+        if waypoint.moving and phase == (0 if order > 0 else task.phases - 1):
+            own = found[::order]  # a view: seen from the end, speeds change their sign
+            step = order * duration * waypoint.rate(1, count) / (degree * task.spans)
+            bend = duration**2 * waypoint.rate(2, count) / (degree * (degree - 1) * task.spans**2)
+            own[1] = own[0] + step
+            own[2] = own[1] + 2 * (step + bend)
+    return found
+
+
+def remaining(task: Task, spline: Spline, times: Array) -> Guess:
+    """Another motion as a guess.
+
+    Args:
+        task: The task.
+        spline: The motion; it rests beyond its ends.
+        times: When the motion is at the waypoints, s. Shape (waypoints,).
+    """
+    points, durations = [], np.diff(times)
+    for phase, (begin, duration) in enumerate(zip(times[:-1], durations, strict=True)):
+        own = fitted_controls(task, spline(begin + duration * unit_times(task)))
+        points.append(moving_ends(task, own, float(duration), phase))
+    return Guess(points=tuple(points), durations=durations, near=True)
 
 
 def guesses(task: Task) -> Iterator[Guess]:
@@ -72,7 +103,9 @@ def straight(task: Task, bend: float = 0.0) -> Guess:
         points.append(fitted_controls(task, path))
         durations.append(_duration(task, after.guess - before.guess))
     share = task.duration / sum(durations) if task.duration is not None else min(1.0, task.longest / sum(durations))
-    return Guess(points=tuple(points), durations=share * np.array(durations))
+    times = share * np.array(durations)
+    ends = (moving_ends(task, own, float(times[k]), k) for k, own in enumerate(points))
+    return Guess(points=tuple(ends), durations=times)
 
 
 def _duration(task: Task, distance: Array) -> float:

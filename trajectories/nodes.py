@@ -86,25 +86,37 @@ def _node(
     """The functions of a node; equal tasks share them, because they take longer to make than to use."""
     import casadi as ca
 
-    z, t, slack = ca.SX.sym("z", orders * count), ca.SX.sym("t"), ca.SX.sym("r", slacks)
-    curves = [z[m * count : (m + 1) * count] / t**m for m in range(orders)]
-    curves += [ca.SX.zeros(count)] * (4 - orders)
+    curves, slack = ca.SX.sym("c", orders * count), ca.SX.sym("r", slacks)
+    given = [curves[m * count : (m + 1) * count] for m in range(orders)] + [ca.SX.zeros(count)] * (4 - orders)
     rows, low, high = ca.SX.zeros(0, 1), np.zeros(0), np.zeros(0)
     if limited is not None:
-        rows, low, high = _limited(limited(*curves), np.array(lower), np.array(upper), slack)
-    rate = jerk * ca.sumsqr(curves[3]) if jerk else ca.SX(0)
+        rows, low, high = _limited(limited(*given), np.array(lower), np.array(upper), slack)
+    rate = jerk * ca.sumsqr(given[3]) if jerk else ca.SX(0)
     if any(weights):
-        rate += ca.dot(ca.DM(weights), running(*curves))
+        rate += ca.dot(ca.DM(weights), running(*given))
+    rate, rows = ca.cse([rate, rows])  # before and after differentiation: a third of the instructions remains
+    z, t, factor, weight = (ca.SX.sym(name, size) for name, size in (("z", orders * count), ("t", 1), ("s", 1),
+                                                                    ("l", rows.numel())))  # fmt: skip
+    # by the chain rule through position … jerk in time: half the instructions of differentiating by w
+    inner, share = ca.vertcat(curves, slack), ca.SX.sym("share")
+    slope, slopes = ca.jacobian(rate, inner), ca.jacobian(rows, inner)
+    first = ca.densify(ca.vertcat(share * slope.T + slopes.T @ weight, rate))  # of share * rate + weight' rows, by (inner, share)
+    second = ca.jacobian(first, ca.vertcat(inner, share))
     w = ca.vertcat(z, t, slack)
-    cost, rows = ca.cse([t * rate, rows])  # before and after differentiation: a third of the instructions remains
-    factor, weight = ca.SX.sym("s"), ca.SX.sym("l", rows.numel())
-    slopes = ca.jacobian(rows, w)
-    hessian = ca.jacobian(factor * ca.gradient(cost, w) + slopes.T @ weight, w)
+    outer = ca.vertcat(*(z[m * count : (m + 1) * count] / t**m for m in range(orders)), slack)
+    outer_share = ca.vertcat(outer, factor * t)
+    chain, pull = ca.jacobian(outer_share, w), ca.SX.sym("g", first.numel())
+    hessian = chain.T @ second @ chain + ca.substitute(ca.jacobian(chain.T @ pull, w), pull, first)
+
+    def along(name: str, more: list[Any], result: list[Any]) -> Any:
+        return ca.Function(name, [w, *more], ca.substitute(result, [inner, share], [outer, factor * t]), {"cse": True})
+
+    gradient = t * (slope @ ca.jacobian(outer, w)).T + rate * ca.jacobian(t, w).T
     return _Node(
-        value=ca.Function("node", [w], [cost, rows], {"cse": True}),
-        gradient=ca.Function("node_gradient", [w], [ca.gradient(cost, w)], {"cse": True}),
-        jacobian=ca.Function("node_jacobian", [w], [slopes], {"cse": True}),
-        hessian=ca.Function("node_hessian", [w, factor, weight], [hessian], {"cse": True}),
+        value=along("node", [], [t * rate, rows]),
+        gradient=along("node_gradient", [], [gradient]),
+        jacobian=along("node_jacobian", [], [slopes @ ca.jacobian(outer, w)]),
+        hessian=along("node_hessian", [factor, weight], [hessian]),
         lower=low,
         upper=high,
     )

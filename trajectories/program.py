@@ -8,7 +8,7 @@ Quantities and running costs stand in `nodes.py`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,11 +16,15 @@ from numpy.typing import NDArray
 
 from .limits import ORDERS
 from .nodes import TIGHTENING, Nodes, casadi_matrix, spread_hessian, spread_jacobian
+from .passing import pattern, row_values, rows
 from .shape import Shape
 from .spline import Spline, clamped_knots
 from .task import Limit, Task
 
 Array = NDArray[np.float64]
+
+#: Programs that are kept for the next task that differs in places, speeds and times alone.
+KEPT = 8
 
 
 def derivative_matrices(spans: int, degree: int) -> list[Array]:
@@ -30,15 +34,17 @@ def derivative_matrices(spans: int, degree: int) -> list[Array]:
     return [unit.derivative_points(order)[1] for order in range(min(4, degree + 1))]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Program:
-    """A nonlinear program ready for a solver.
+    """A nonlinear program ready for a solver. Its parameter is a factor on the cost.
 
     Attributes:
         shape: Order of the variables.
         problem: Functions of the program by the names that CasADi's IPOPT interface gives them.
-        lower: Lower bounds of the rows; those of the quantities come last, node by node.
-        upper: Upper bounds of the rows.
+        lower: Lower bounds of the rows without those of waypoints and durations; those of the quantities come last,
+            node by node.
+        upper: Upper bounds of the same rows.
+        given: How many rows stand before those of waypoints and durations.
         limits: What each slack of the relaxed program widens.
         nodes: Number of collocation points.
     """
@@ -47,34 +53,78 @@ class Program:
     problem: dict[str, Any]
     lower: Array
     upper: Array
+    given: int
     limits: tuple[Limit, ...]
     nodes: int
 
+    def rows(self, task: Task) -> tuple[Array, Array]:
+        """Bounds of all rows for a task of this program."""
+        low, high = row_values(task)
+        if task.phases > 1:
+            ends = (0.0, task.longest) if task.duration is None else (task.duration,) * 2
+            low, high = np.append(low, ends[0]), np.append(high, ends[1])
+        return tuple(
+            np.concatenate([own[: self.given], values, own[self.given :]])
+            for own, values in ((self.lower, low), (self.upper, high))
+        )  # type: ignore[return-value]
 
-def build(task: Task, scale: float, *, relaxed: bool = False) -> Program:
-    """The program of a task.
+
+@dataclass(frozen=True, eq=False)
+class _Form:
+    """A task as far as its program depends on it: not on places, speeds and times."""
+
+    task: Task
+    relaxed: bool
+
+    @cached_property
+    def key(self) -> tuple[Any, ...]:
+        """Equal for tasks of one program."""
+        task, given, cost = self.task, self.task.quantities, self.task.cost
+        return (
+            self.relaxed, task.phases, task.spans, task.degree, task.rest, pattern(task), task.limits.names,
+            task.limits.units, *(tuple(task.limits.of(order)) for order in ORDERS),
+            given and (given.function, given.names, given.units, tuple(given.lower), tuple(given.upper)),
+            (cost.time, cost.jerk, cost.running, cost.weights),
+        )  # fmt: skip
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Form) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+
+def build(task: Task, *, relaxed: bool = False) -> Program:
+    """The program of a task; tasks that differ in places, speeds and times alone share it.
 
     Args:
         task: The task.
-        scale: Factor on the cost, so that it is about 1.
         relaxed: Whether the limits may be widened: then the cost is the sum of their slacks.
     """
+    return _built(_Form(task, relaxed))
+
+
+@lru_cache(maxsize=KEPT)
+def _built(form: _Form) -> Program:
     import casadi as ca
 
+    task, relaxed = form.task, form.relaxed
     limits = relaxable(task) if relaxed else ()
     shape = Shape(
         count=len(task.limits.names), controls=task.spans + task.degree, phases=task.phases, slacks=len(limits)
     )
-    x = ca.SX.sym("x", shape.size)
-    rows, low, high, cost = _smooth(task, shape, x, scale, relaxed)
-    smooth = _derivatives(x, rows, cost)
+    x, scale = ca.SX.sym("x", shape.size), ca.SX.sym("p")
+    limited, given, cost = _smooth(task, shape, x, scale, relaxed)
+    smooth = _derivatives(x, scale, ca.vertcat(limited, given), cost)
     nodes = Nodes(task, shape, relaxed)
-    problem = _assembled(shape.size, scale, smooth, nodes)
+    problem = _assembled(shape.size, smooth, nodes)
+    count = limited.numel()
     return Program(
         shape=shape,
         problem=problem,
-        lower=np.concatenate([low, np.tile(nodes.node.lower, nodes.count)]),
-        upper=np.concatenate([high, np.tile(nodes.node.upper, nodes.count)]),
+        lower=np.concatenate([np.full(count, -np.inf if relaxed else -1.0), np.tile(nodes.node.lower, nodes.count)]),
+        upper=np.concatenate([np.ones(count), np.tile(nodes.node.upper, nodes.count)]),
+        given=count,
         limits=limits,
         nodes=nodes.count,
     )
@@ -115,8 +165,8 @@ def relaxable(task: Task) -> tuple[Limit, ...]:
     return tuple(found)
 
 
-def _smooth(task: Task, shape: Shape, x: Any, scale: float, relaxed: bool) -> tuple[Any, Array, Array, Any]:
-    """Rows on control points and durations, their bounds, and the cost of time or of the slacks."""
+def _smooth(task: Task, shape: Shape, x: Any, scale: Any, relaxed: bool) -> tuple[Any, Any, Any]:
+    """Rows of the limits on control points, rows of waypoints and durations, and the cost of time or of the slacks."""
     import casadi as ca
 
     phases = [
@@ -124,13 +174,7 @@ def _smooth(task: Task, shape: Shape, x: Any, scale: float, relaxed: bool) -> tu
         for p in range(shape.phases)
     ]
     maps = [ca.DM(ca.sparsify(ca.DM(m))) for m in derivative_matrices(task.spans, task.degree)]
-    rows, low, high = [ca.SX.zeros(0, 1)], [np.zeros(0)], [np.zeros(0)]
-
-    def add(row: Any, least: float, most: float) -> None:
-        rows.append(row)
-        low.append(np.full(row.numel(), least))
-        high.append(np.full(row.numel(), most))
-
+    limited = [ca.SX.zeros(0, 1)]
     slack = x[shape.phases * shape.block :]
     used = 0
     for order in ORDERS:
@@ -139,77 +183,40 @@ def _smooth(task: Task, shape: Shape, x: Any, scale: float, relaxed: bool) -> tu
                 continue
             for points, duration in phases:
                 row = maps[order] @ points[:, k] / (limit * (1 - TIGHTENING) * duration**order)
-                if relaxed:
-                    add(ca.vertcat(row, -row) - slack[used], -np.inf, 1.0)
-                else:
-                    add(row, -1.0, 1.0)
+                limited.append(ca.vertcat(row, -row) - slack[used] if relaxed else row)
             used += 1
-    for row in (*_ends(task, phases), *_junctions(task, phases, maps)):
-        add(row, 0.0, 0.0)
     total = ca.sum1(ca.vertcat(*(duration for _, duration in phases)))
-    if shape.phases > 1:
-        add(total, *((task.duration,) * 2 if task.duration is not None else (0.0, task.longest)))
-    return ca.vertcat(*rows), np.concatenate(low), np.concatenate(high), (
-        ca.sum1(slack) + 1e-6 * total if relaxed else scale * task.cost.time * total
-    )  # fmt: skip
+    given = [*rows(task, phases, maps), *([total] if shape.phases > 1 else [])]
+    cost = ca.sum1(slack) + 1e-6 * total if relaxed else scale * task.cost.time * total
+    return ca.vertcat(*limited), ca.vertcat(ca.SX.zeros(0, 1), *given), cost
 
 
-def _ends(task: Task, phases: list[Any]) -> list[Any]:
-    """Rest and place at the waypoints, as rows that vanish; what is given of coordinates stands in the bounds."""
-    import casadi as ca
-
-    rows = []
-    for k, waypoint in enumerate(task.waypoints):
-        points = phases[min(k, task.phases - 1)][0]
-        at = points[0, :] if k < task.phases else points[-1, :]
-        if waypoint.through is not None:
-            value = ca.DM(np.asarray(waypoint.value, dtype=float))
-            there = waypoint.through(at.T) - value
-            rows += [there[i] for i in range(value.numel()) if np.isfinite(float(value[i]))]
-    first, last = phases[0][0], phases[-1][0]
-    for points, order, waypoint in ((first, 1, task.waypoints[0]), (last, -1, task.waypoints[-1])):
-        at = 0 if order > 0 else points.shape[0] - 1
-        for i in np.flatnonzero(np.isnan(waypoint.known)):
-            rows += [points[at + order * j, int(i)] - points[at, int(i)] for j in range(1, task.rest)]
-    return rows
-
-
-def _junctions(task: Task, phases: list[Any], maps: list[Any]) -> list[Any]:
-    """Equal position, speed and acceleration where phases meet."""
-    rows = []
-    for (before, t), (after, u) in pairwise(phases):
-        for order in range(3):
-            ends, starts = maps[order][-1, :] @ before, maps[order][0, :] @ after
-            rows.append((ends * (u / t) ** order - starts).T if order else (ends - starts).T)
-    return rows
-
-
-def _derivatives(x: Any, rows: Any, cost: Any) -> dict[str, Any]:
+def _derivatives(x: Any, scale: Any, rows: Any, cost: Any) -> dict[str, Any]:
     import casadi as ca
 
     factor, weight = ca.SX.sym("s"), ca.SX.sym("l", rows.numel())
     hessian = ca.triu(ca.hessian(factor * cost + ca.dot(weight, rows), x)[0])
     return {
-        "value": ca.Function("smooth", [x], [cost, rows]),
-        "gradient": ca.Function("smooth_gradient", [x], [ca.gradient(cost, x)]),
+        "value": ca.Function("smooth", [x, scale], [cost, rows]),
+        "gradient": ca.Function("smooth_gradient", [x, scale], [ca.gradient(cost, x)]),
         "jacobian": ca.Function("smooth_jacobian", [x], [ca.jacobian(rows, x)]),
         "hessian": ca.Function("smooth_hessian", [x, factor, weight], [hessian]),
     }
 
 
-def _assembled(size: int, scale: float, smooth: dict[str, Any], nodes: Nodes) -> dict[str, Any]:
+def _assembled(size: int, smooth: dict[str, Any], nodes: Nodes) -> dict[str, Any]:
     """The whole program's functions."""
     import casadi as ca
 
-    x, factor = ca.MX.sym("x", size), ca.MX.sym("s")
-    cost, rows = smooth["value"](x)
-    gradient, jacobian = smooth["gradient"](x), smooth["jacobian"](x)
+    x, p, factor = ca.MX.sym("x", size), ca.MX.sym("p"), ca.MX.sym("s")
+    cost, rows = smooth["value"](x, p)
+    gradient, jacobian = smooth["gradient"](x, p), smooth["jacobian"](x)
     weight = ca.MX.sym("l", rows.numel() + nodes.rows * nodes.count)
     hessian = smooth["hessian"](x, factor, weight[: rows.numel()])
     select = casadi_matrix(nodes.select)
     w = ca.reshape(select @ x, nodes.width, nodes.count)
     costs, limited = nodes.node.value.map(nodes.count)(w)
-    shares = scale * ca.DM(nodes.weights).T
+    shares = p * ca.DM(nodes.weights).T
     cost += ca.dot(shares, costs)
     slopes = nodes.node.gradient.map(nodes.count)(w)
     gradient += select.T @ ca.vec(slopes * ca.repmat(shares, nodes.width, 1))
@@ -218,7 +225,6 @@ def _assembled(size: int, scale: float, smooth: dict[str, Any], nodes: Nodes) ->
     curved = nodes.node.hessian.map(nodes.count)(w, factor * shares, given)
     hessian += spread_hessian(nodes, curved)
     rows = ca.vertcat(rows, ca.vec(limited))
-    p = ca.MX.sym("p", 0)
     return {
         "nlp": {"x": x, "p": p, "f": cost, "g": rows},
         "grad_f": ca.Function("nlp_grad_f", [x, p], [cost, gradient], ["x", "p"], ["f", "grad_f_x"]),

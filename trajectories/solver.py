@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .guess import Guess
-from .program import Program
+from .passing import fixed
+from .program import KEPT, Program
 from .shape import Shape
 from .spline import Spline, clamped_knots, joined
 from .task import Task
@@ -24,23 +25,29 @@ _IPOPT = {
 
 #: Least duration of a phase, as a share of the guess.
 FLOOR = 0.02
+#: Further options where the search starts close to a solution.
+NEAR = (
+    ("mu_strategy", "monotone"), ("mu_init", 1e-4), ("bound_push", 1e-6), ("bound_frac", 1e-6),
+    ("slack_bound_push", 1e-6), ("slack_bound_frac", 1e-6),
+)  # fmt: skip
 #: Further options where the search starts at the solution of nearly the same program.
-AGAIN = {
-    "warm_start_init_point": "yes", "mu_strategy": "monotone", "mu_init": 1e-6, "warm_start_bound_push": 1e-8,
-    "warm_start_mult_bound_push": 1e-8, "warm_start_slack_bound_push": 1e-8, "warm_start_bound_frac": 1e-8,
-    "warm_start_slack_bound_frac": 1e-8,
-}  # fmt: skip
+AGAIN = (
+    ("warm_start_init_point", "yes"), ("mu_strategy", "monotone"), ("mu_init", 1e-6), ("warm_start_bound_push", 1e-8),
+    ("warm_start_mult_bound_push", 1e-8), ("warm_start_slack_bound_push", 1e-8), ("warm_start_bound_frac", 1e-8),
+    ("warm_start_slack_bound_frac", 1e-8),
+)  # fmt: skip
 
 
-def solver_of(program: Program, **options: Any) -> Any:
-    """IPOPT on a program; numbers in `options` replace the usual ones."""
+@lru_cache(maxsize=2 * KEPT)
+def solver_of(program: Program, options: tuple[tuple[str, Any], ...] = ()) -> Any:
+    """IPOPT on a program; `options` replace the usual ones. Kept as long as the program is."""
     import casadi as ca
 
     functions = {name: f for name, f in program.problem.items() if name != "nlp"}
     return ca.nlpsol(
         "motion", "ipopt", program.problem["nlp"],
         {**functions, "print_time": False, "error_on_fail": False, "no_nlp_grad": True,
-         "calc_lam_p": False, "ipopt": {**_IPOPT, **options}},
+         "calc_lam_p": False, "ipopt": {**_IPOPT, **dict(options)}},
     )  # fmt: skip
 
 
@@ -59,25 +66,12 @@ def bounds(task: Task, program: Program, start: Guess) -> dict[str, Array]:
     if task.duration is not None and shape.phases == 1:
         low[shape.duration(0)] = task.duration
     low[shape.size - shape.slacks :] = 0.0
-    for places, values in _given(task, shape):
-        low[places] = high[places] = values
+    for places, least_here, most_here in fixed(task, shape):
+        if least_here < most_here:
+            low[places], high[places] = np.maximum(low[places], least_here), np.minimum(high[places], most_here)
+        else:
+            low[places] = high[places] = least_here
     return {"lbx": low, "ubx": high}
-
-
-def _given(task: Task, shape: Shape) -> list[tuple[Any, float]]:
-    """Places of the variables that waypoints fix, and their values."""
-    fixed = []
-    for number, waypoint in enumerate(task.waypoints):
-        for k, value in enumerate(waypoint.known):
-            if np.isnan(value):
-                continue
-            if number < shape.phases:
-                still = task.rest if number == 0 else 1
-                fixed.append((shape.place(number, np.arange(still), k), float(value)))
-            if number > 0:
-                still = task.rest if number == shape.phases else 1
-                fixed.append((shape.place(number - 1, shape.controls - 1 - np.arange(still), k), float(value)))
-    return fixed
 
 
 def assembled(task: Task, shape: Shape, x: Array) -> tuple[Spline, tuple[float, ...]]:

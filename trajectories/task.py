@@ -26,13 +26,23 @@ class Waypoint:
         through: CasADi function of the coordinates, shape (n,), such as the place of a tool; None for the coordinates
             themselves.
         near: Coordinates from which the search starts where `value` does not give them all. Shape (n,).
+        tolerance: How far the motion may be from each entry of `value`; None for not at all. The shape of `value`.
+        speed: Speed of the coordinates there, of the first or the last waypoint; None for rest. Shape (n,).
+        acceleration: Their acceleration, where `speed` is given; None for none. Shape (n,).
     """
 
     value: Array
     through: Any = None
     near: Array | None = None
+    tolerance: Array | None = None
+    speed: Array | None = None
+    acceleration: Array | None = None
 
     def __post_init__(self) -> None:
+        if self.acceleration is not None and self.speed is None:
+            raise ValueError("an acceleration stands beside a speed: got it alone; give the speed too")
+        if self.tolerance is not None and not (np.asarray(self.tolerance) >= 0).all():
+            raise ValueError(f"a tolerance is not negative: got {np.asarray(self.tolerance).tolist()}; give none or more")
         if self.through is not None and self.near is None:
             raise ValueError(
                 "a place that a function gives needs coordinates near it to start from: got none; give near"
@@ -47,9 +57,34 @@ class Waypoint:
         return np.asarray(self.near if self.near is not None else value, dtype=float)
 
     @property
+    def moving(self) -> bool:
+        """Whether the motion does not rest there."""
+        return self.speed is not None
+
+    @property
+    def asked(self) -> Array:
+        """Indices of the entries of `value` that are given."""
+        return np.flatnonzero(np.isfinite(np.asarray(self.value, dtype=float)))
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """Least and largest admissible entries of `value`; NaN where they are free."""
+        value = np.asarray(self.value, dtype=float)
+        room = 0.0 if self.tolerance is None else np.asarray(self.tolerance, dtype=float)
+        return value - room, value + room
+
+    @property
     def known(self) -> Array:
-        """The coordinates that are given, NaN elsewhere. Shape (n,)."""
-        return np.asarray(self.value, dtype=float) if self.through is None else np.full(len(self.guess), np.nan)
+        """The coordinates that are given exactly, NaN elsewhere. Shape (n,)."""
+        if self.through is not None:
+            return np.full(len(self.guess), np.nan)
+        low, high = self.ends
+        return np.where(low == high, low, np.nan)
+
+    def rate(self, order: int, count: int) -> Array:
+        """Speed (order 1) or acceleration (order 2) there. Shape (count,)."""
+        given = (self.speed, self.acceleration)[order - 1]
+        return np.zeros(count) if given is None else np.asarray(given, dtype=float)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,10 +121,10 @@ class Cost:
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """A motion from rest to rest through waypoints.
+    """A motion through waypoints.
 
     Attributes:
-        waypoints: At least two; the motion rests at the first and the last.
+        waypoints: At least two; the motion rests at the first and the last, unless they give a speed.
         limits: Limits of the coordinates and their derivatives.
         quantities: What else is limited; None for nothing.
         cost: What is minimised.
@@ -127,6 +162,10 @@ class Task:
             (f"waypoints need {count} coordinates, or a place to start the search from",
              all(w.guess.shape == (count,) and np.isfinite(w.guess).all() for w in self.waypoints),
              [w.guess.tolist() for w in self.waypoints]),
+            ("a speed is that of the first or the last waypoint, and has an entry for each coordinate",
+             all(w.rate(order, count).shape == (count,) for w in self.waypoints for order in (1, 2))
+             and not any(w.moving for w in self.waypoints[1:-1]),
+             [None if w.speed is None else np.asarray(w.speed).tolist() for w in self.waypoints]),
         ):  # fmt: skip
             if not right:
                 raise ValueError(f"{rule}: got {got}")

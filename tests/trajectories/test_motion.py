@@ -75,27 +75,27 @@ def test_derivatives_of_the_program_are_those_of_its_functions(relaxed, places):
         cost=cost,
         spans=6,
     )
-    program = build(task, 0.7, relaxed=relaxed)
-    x, f, g = (program.problem["nlp"][name] for name in "xfg")
+    program = build(task, relaxed=relaxed)
+    x, p, f, g = (program.problem["nlp"][name] for name in "xpfg")
     random = np.random.default_rng(1)
     guess = straight(task)
     point = program.shape.packed([p + random.normal(0, 0.05, p.shape) for p in guess.points], guess.durations)
     point[program.shape.size - program.shape.slacks :] = random.uniform(0, 1, program.shape.slacks)
     weight = random.normal(size=g.numel())
-    empty = np.zeros(0)
+    scale = 0.7
     symbol = ca.MX.sym("l", g.numel())
-    gradient = ca.Function("d", [x], [ca.gradient(f, x)])
-    jacobian = ca.Function("j", [x], [ca.jacobian(g, x)])
-    hessian = ca.Function("h", [x, symbol], [ca.triu(ca.hessian(0.4 * f + ca.dot(symbol, g), x)[0])])
+    gradient = ca.Function("d", [x, p], [ca.gradient(f, x)])
+    jacobian = ca.Function("j", [x, p], [ca.jacobian(g, x)])
+    hessian = ca.Function("h", [x, p, symbol], [ca.triu(ca.hessian(0.4 * f + ca.dot(symbol, g), x)[0])])
     dense = {
-        "grad_f": (np.array(program.problem["grad_f"](point, empty)[1]), np.array(gradient(point))),
+        "grad_f": (np.array(program.problem["grad_f"](point, scale)[1]), np.array(gradient(point, scale))),
         "jac_g": (
-            np.array(ca.densify(program.problem["jac_g"](point, empty)[1])),
-            np.array(ca.densify(jacobian(point))),
+            np.array(ca.densify(program.problem["jac_g"](point, scale)[1])),
+            np.array(ca.densify(jacobian(point, scale))),
         ),
         "hess_lag": (
-            np.array(ca.densify(program.problem["hess_lag"](point, empty, 0.4, weight))),
-            np.array(ca.densify(hessian(point, weight))),
+            np.array(ca.densify(program.problem["hess_lag"](point, scale, 0.4, weight))),
+            np.array(ca.densify(hessian(point, scale, weight))),
         ),
     }
     for own, oracle in dense.values():
