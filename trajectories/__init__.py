@@ -3,6 +3,7 @@
 from .bezier import Pieces as Pieces
 from .bezier import pieces as pieces
 from .collocation import Motion as Motion
+from .collocation import motion_of as motion_of
 from .collocation import solve as solve
 from .guess import Guess as Guess
 from .jerk_limited import jerk_limited as jerk_limited

@@ -14,8 +14,8 @@ from .guess import Guess, guesses, straight
 from .limits import LimitViolatedError, violations
 from .nodes import POINTS, TIGHTENING, gauss
 from .program import Program, build
-from .quantity import Peaks, peaks
-from .solver import AGAIN, FLOOR, NEAR, assembled, bounds, solver_of
+from .quantity import Peaks, Quantities, peaks
+from .solver import AGAIN, FLOOR, HURRY, NEAR, assembled, bounds, solver_of
 from .spline import Spline, clamped_knots
 from .task import Cost, Task, Waypoint
 
@@ -38,8 +38,8 @@ LONGEST = 1e4
 #: Where a search ends at this share of the longest admitted duration, the quickest motion is looked for first; where
 #: that takes so many times the admitted duration, no other start is tried.
 AT_THE_END, FAR_LONGER = 0.9, 1.2
-#: CPU time for finding out why there is no motion, and of one program of that, s.
-PATIENCE, ONE = 6.0, 4.0
+#: CPU time for finding out why there is no motion, s.
+PATIENCE = 8.0
 #: No other start is tried once the solver has taken so many iterations.
 ITERATIONS = 300
 
@@ -53,6 +53,7 @@ class Motion:
         arrivals: Times at the waypoints after the first, s.
         cost: Value of the weighted cost.
         parts: Integrals that the cost weighs: "time", "jerk", and the task's running costs.
+        quantities: What else was limited; None for nothing.
         peaks: Bounds of the quantities for all t; None where there are none.
         rounds: Programs solved until the limits held between the collocation points.
         iterations: Iterations of the solver, all rounds together.
@@ -62,6 +63,7 @@ class Motion:
     arrivals: tuple[float, ...]
     cost: float
     parts: dict[str, float]
+    quantities: Quantities | None
     peaks: Peaks | None
     rounds: int
     iterations: int
@@ -92,17 +94,21 @@ def solve(task: Task, begin: float = 0.0, guess: Guess | None = None) -> Motion:
     _reject_places(task)
     starts = guesses(task) if guess is None else iter([guess])
     first = _Attempt(task, next(starts))
-    motion, relaxation, shortest = first.run(), None, None
-    if motion is None and first.share > AT_THE_END:
-        shortest = _shortest(task, _Clock(PATIENCE))
-    if motion is None and not (shortest or 0.0) > FAR_LONGER * task.longest:
-        relaxation = relaxed(task, first.start)
+    motion = first.run()
+    if motion is not None:
+        return _from(motion, begin)
+    clock = _Clock(PATIENCE)
+    shortest = _shortest(task, clock) if first.share > AT_THE_END else None
+    hopeless = shortest is not None and shortest > FAR_LONGER * task.longest
+    relaxation = relaxed(task, first.start, HURRY if hopeless else ())
+    if not hopeless:
         known = [] if relaxation is None or relaxation.widened else [relaxation.guess]
         motion = _elsewhere(task, (*known, *starts), first.iterations)
-    if motion is None:
-        crowded = relaxation is not None and relaxation.crowded
-        raise refusal(task, _reasons(task, relaxation, _Clock(PATIENCE)), first.failure, shortest, crowded=crowded)
-    return _from(motion, begin)
+        if motion is not None:
+            return _from(motion, begin)
+        clock = _Clock(PATIENCE)
+    crowded = relaxation is not None and relaxation.crowded
+    raise refusal(task, _reasons(task, relaxation, clock), first.failure, shortest, crowded=crowded)
 
 
 def _elsewhere(task: Task, starts: tuple[Guess, ...], iterations: int) -> Motion | None:
@@ -210,7 +216,7 @@ class _Attempt:
         task = self.task
         size = _first_cost(task, start)
         program, scale = build(task), 1.0 / size if size > 0 else 1.0
-        hurry = () if self.clock is None else (("max_cpu_time", ONE),)
+        hurry = () if self.clock is None else HURRY
         solver = solver_of(program, (*hurry, *(NEAR if start.near else ())))
         x = program.shape.packed(list(start.points), start.durations)
         lower, upper = program.rows(task)
@@ -242,11 +248,19 @@ class _Attempt:
         return None, False
 
     def _motion(self, spline: Spline, arrivals: tuple[float, ...], found: Peaks | None, rounds: int) -> Motion:
-        parts = integrals(self.task, spline)
-        return Motion(
-            spline=spline, arrivals=arrivals, cost=self.task.cost.value(parts),
-            parts=parts, peaks=found, rounds=rounds, iterations=self.iterations,
-        )  # fmt: skip
+        return motion_of(self.task, spline, arrivals, found, rounds=rounds, iterations=self.iterations)
+
+
+def motion_of(
+    task: Task, spline: Spline, arrivals: tuple[float, ...], found: Peaks | None, *, rounds: int = 0,
+    iterations: int = 0,
+) -> Motion:  # fmt: skip
+    """A motion of a task, with what it costs."""
+    parts = integrals(task, spline)
+    return Motion(
+        spline=spline, arrivals=arrivals, cost=task.cost.value(parts), parts=parts, quantities=task.quantities,
+        peaks=found, rounds=rounds, iterations=iterations,
+    )  # fmt: skip
 
 
 def integrals(task: Task, spline: Spline) -> dict[str, float]:
@@ -255,11 +269,10 @@ def integrals(task: Task, spline: Spline) -> dict[str, float]:
     local, weights = gauss(1)
     times = (edges[:-1, None] + np.diff(edges)[:, None] * local).ravel()
     shares = (np.diff(edges)[:, None] * weights).ravel()
-    jerk = spline(times, 3).reshape(len(times), -1) if spline.degree >= 3 else np.zeros((len(times), 1))
-    found = {"time": spline.end - spline.start, "jerk": float(shares @ (jerk**2).sum(axis=1))}
+    curves = spline.curves(times)
+    found = {"time": spline.end - spline.start, "jerk": float(shares @ (curves[3] ** 2).sum(axis=1))}
     if task.cost.running is not None:
-        curves = [spline(times, order).reshape(len(times), -1).T for order in range(4)]
-        values = np.array(task.cost.running.map(len(times))(*curves))
+        values = np.array(task.cost.running.map(len(times))(*(curve.T for curve in curves)))
         found |= {name: float(shares @ row) for name, row in zip(task.cost.names, values, strict=True)}
     return found
 

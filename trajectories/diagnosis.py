@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,10 +112,10 @@ def at_rest(task: Task, place: Array) -> str:
     return "; ".join(found)
 
 
-def relaxed(task: Task, start: Guess) -> Relaxation | None:
+def relaxed(task: Task, start: Guess, options: tuple[tuple[str, Any], ...] = ()) -> Relaxation | None:
     """Solve the program in which every limit may give way, for the least sum of widenings; None where that fails."""
     program = build(task, relaxed=True)
-    solver = solver_of(program)
+    solver = solver_of(program, options)
     x = program.shape.packed(list(start.points), start.durations)
     x[program.shape.size - program.shape.slacks :] = 1.0
     lower, upper = program.rows(task)

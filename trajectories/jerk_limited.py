@@ -19,14 +19,20 @@ SAME = 1e-9
 TIGHTENING = 1e-4
 
 
-def jerk_limited(start: ArrayLike, goal: ArrayLike, limits: MotionLimits, begin: float = 0.0) -> Spline:
+def jerk_limited(
+    start: ArrayLike, goal: ArrayLike, limits: MotionLimits, begin: float = 0.0, *,
+    speeds: tuple[ArrayLike | None, ArrayLike | None] = (None, None), acceleration: ArrayLike | None = None,
+) -> Spline:  # fmt: skip
     """The quickest move of n coordinates that arrive together, jerk piecewise constant.
 
     Args:
         start: First position. Shape (n,).
         goal: Last position. Shape (n,).
-        limits: Finite limits of speed, acceleration and jerk; a straight move of one coordinate stays between its ends.
+        limits: Finite limits of speed, acceleration and jerk; a move of one coordinate from rest to rest stays between
+            its ends.
         begin: First time, s.
+        speeds: Speeds at the start and at the goal; None for rest. Shape (n,).
+        acceleration: Acceleration at the start; None for none. Shape (n,).
 
     Returns:
         A spline of degree 3. Shape of its coefficients (k, n).
@@ -43,17 +49,18 @@ def jerk_limited(start: ArrayLike, goal: ArrayLike, limits: MotionLimits, begin:
     Not guaranteed: efforts, obstacles and paths are not considered; use `solve` for those.
     """
     first, last = (np.atleast_1d(np.asarray(p, dtype=float)) for p in (start, goal))
-    profiles, duration = _profiles(first, last, limits)
+    rates = [np.zeros(len(first)) if v is None else np.asarray(v, dtype=float) for v in (*speeds, acceleration)]
+    profiles, duration = _profiles(first, last, limits, rates)
     own = [np.concatenate([[0.0], np.cumsum(profile.t)]) for profile in profiles]
     times = np.unique(np.concatenate([*own, [0.0, duration]]))
     times = times[np.concatenate([[True], np.diff(times) > SAME * duration])]
     times[-1] = duration
     columns = [
-        _cubic(times, edges, np.append(profile.j, 0.0), at)
-        for edges, profile, at in zip(own, profiles, first, strict=True)
+        _cubic(times, edges, np.append(profile.j, 0.0), state)
+        for edges, profile, *state in zip(own, profiles, first, rates[0], rates[2], strict=True)
     ]
     coefficients = np.stack(columns, axis=1)
-    coefficients[-3:] = last  # at rest there, up to the rounding of the integration
+    coefficients[-1 if rates[1].any() else -3 :] = last  # up to the rounding of the integration
     knots = begin + np.concatenate([np.zeros(3), times, np.full(3, duration)])
     spline = Spline(knots=knots, coefficients=coefficients)
     free = replace(limits, position=(-np.inf, np.inf))
@@ -63,19 +70,20 @@ def jerk_limited(start: ArrayLike, goal: ArrayLike, limits: MotionLimits, begin:
     return spline
 
 
-def _profiles(start: Array, goal: Array, limits: MotionLimits) -> tuple[list[Any], float]:
+def _profiles(start: Array, goal: Array, limits: MotionLimits, rates: list[Array]) -> tuple[list[Any], float]:
     try:
         import ruckig
     except ImportError as error:
         raise ImportError('jerk-limited moves need Ruckig: pip install "hdmm-opt[ruckig]"') from error
 
     sizes = [limits.of(order) * (1 - TIGHTENING) for order in (1, 2, 3)]
-    if not np.abs(goal - start).max() > 0:
+    if not np.abs(goal - start).max() > 0 and not any(rate.any() for rate in rates):
         raise ValueError(f"a move needs two places: got {start.tolist()} twice")
     if not all(np.isfinite(size).all() and (size > 0).all() for size in sizes):
         raise ValueError("a jerk-limited move needs finite positive limits of speed, acceleration and jerk: got others")
     given = ruckig.InputParameter(len(start))
     given.current_position, given.target_position = start.tolist(), goal.tolist()
+    given.current_velocity, given.target_velocity, given.current_acceleration = (rate.tolist() for rate in rates)
     given.max_velocity, given.max_acceleration, given.max_jerk = (size.tolist() for size in sizes)
     trajectory = ruckig.Trajectory(len(start))
     result = ruckig.Ruckig(len(start)).calculate(given, trajectory)
@@ -84,11 +92,11 @@ def _profiles(start: Array, goal: Array, limits: MotionLimits) -> tuple[list[Any
     return trajectory.profiles[0], float(trajectory.duration)
 
 
-def _cubic(times: Array, edges: Array, jerks: Array, start: float) -> Array:
-    """Control points of the cubic spline with a given piecewise constant jerk, from rest."""
+def _cubic(times: Array, edges: Array, jerks: Array, start: list[float]) -> Array:
+    """Control points of the cubic spline with a given piecewise constant jerk, from position, speed, acceleration."""
     middle = (times[:-1] + times[1:]) / 2
     jerk = jerks[np.clip(np.searchsorted(edges, middle, side="right") - 1, 0, len(jerks) - 1)]
-    states = [np.array([start, 0.0, 0.0])]
+    states = [np.array(start)]
     for width, j in zip(np.diff(times), jerk, strict=True):
         p, v, a = states[-1]
         states.append(np.array([

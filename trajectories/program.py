@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 #: Programs that are kept for the next task that differs in places, speeds and times alone.
 KEPT = 8
+#: Quantities keep so many times the reserve at an end that the program chooses.
+END = 2.0
 
 
 def derivative_matrices(spans: int, degree: int) -> list[Array]:
@@ -63,10 +65,16 @@ class Program:
         if task.phases > 1:
             ends = (0.0, task.longest) if task.duration is None else (task.duration,) * 2
             low, high = np.append(low, ends[0]), np.append(high, ends[1])
-        return tuple(
-            np.concatenate([own[: self.given], values, own[self.given :]])
-            for own, values in ((self.lower, low), (self.upper, high))
-        )  # type: ignore[return-value]
+        lower, upper = self.lower.copy(), self.upper.copy()
+        if np.isnan(task.waypoints[-1].known).any() and not task.waypoints[-1].moving:
+            # where the goal leaves room, another motion can start from there
+            last = (len(lower) - self.given) // self.nodes
+            lower[len(lower) - last :] += END * TIGHTENING
+            upper[len(upper) - last :] -= END * TIGHTENING
+        return (
+            np.concatenate([lower[: self.given], low, lower[self.given :]]),
+            np.concatenate([upper[: self.given], high, upper[self.given :]]),
+        )
 
 
 @dataclass(frozen=True, eq=False)

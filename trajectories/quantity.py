@@ -70,9 +70,7 @@ class Quantities:
 
     def values(self, spline: Spline, times: Array) -> Array:
         """The quantities at given times. Shape (q, len(times))."""
-        known = [np.atleast_2d(spline(times, order).T) for order in range(min(4, spline.degree + 1))]
-        curves = known + [np.zeros_like(known[0])] * (4 - len(known))
-        return np.array(self.function.map(len(times))(*curves))
+        return np.array(self.function.map(len(times))(*(curve.T for curve in spline.curves(times))))
 
 
 def sizes(lower: Array, upper: Array) -> Array:

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 GRID = 400
 #: Share of the limits below which no further retiming is tried.
 LEAST_SHARE = 0.2
+#: A quantity is given to TOPP-RA where it is affine in s'² and s'' up to this share of its size; tried at so many places.
+AFFINE, TRIED = 0.01, 9
 #: Retimings at the most, each inside tighter limits, until the composed motion is inside the given ones.
 ROUNDS = 6
 
@@ -35,7 +37,8 @@ class Retimed:
         law: Path coordinate over time: s' is continuous, s'' piecewise constant, so jerk is not limited.
         peaks: Bounds for all t of speeds, accelerations and quantities; all inside their limits.
         quantities: What `peaks` bounds.
-        share: Share of the limits that was left to TOPP-RA so that the motion between its grid points is inside.
+        share: The smaller of the shares of the limits that were left to TOPP-RA, of the coordinates and of the quantities
+            that it is given, so that everything is inside for all t.
     """
 
     law: Spline
@@ -59,8 +62,8 @@ def retime(
         path: The curve.
         limits: Limits of speed and acceleration; jerk is left free.
         enclose: Makes the bounds of a function on pieces of a motion.
-        quantities: Quantities that are affine in x'' and in products of speeds, such as joint torques and actuator
-            forces without friction; what is not is found in the check afterwards, not in the retiming.
+        quantities: Quantities of position, speed and acceleration. Those that are affine in x'' and in products of
+            speeds, such as joint torques, are given to TOPP-RA; the others are in the check afterwards alone.
         grid: Number of intervals on the path.
 
     Returns:
@@ -80,14 +83,18 @@ def retime(
     """
     free = replace(limits, jerk=np.inf)
     checked = along(path, free, quantities, enclose)
-    share = 1.0
+    affine = np.zeros(0, dtype=bool) if quantities is None else _affine(path, free, quantities)
+    told = np.concatenate([np.zeros(len(checked.names) - len(affine), dtype=bool), affine])
+    shares = np.ones(2)  # of the limits of the coordinates, and of those of the quantities that TOPP-RA is told
     for _ in range(ROUNDS):
-        law = _law(path, free, quantities, grid, share)
+        law = _law(path, free, quantities, affine, grid, shares)
         found = peaks(law, checked)
         if found.inside:
-            return Retimed(law=law, peaks=found, quantities=checked, share=share)
-        share *= 1.0 - 1.1 * float((found.excess / checked.scale[:, None]).max()) - 1e-6
-        if not share > LEAST_SHARE:
+            return Retimed(law=law, peaks=found, quantities=checked, share=float(shares.min()))
+        excess = (found.excess / checked.scale[:, None]).max(axis=1, initial=0.0)
+        worst = np.array([excess[~told].max(initial=0.0), excess[told].max(initial=0.0)])
+        shares *= 1.0 - np.where(worst > 0, 1.1 * worst + 1e-6, 0.0)
+        if not shares.min() > LEAST_SHARE:
             break
     worst = int((found.excess.max(axis=1) / checked.scale).argmax())
     raise LimitViolatedError(
@@ -125,15 +132,17 @@ def _sampled(task: Task, values: Array, duration: float) -> Guess:
     return Guess(points=(points,), durations=np.array([duration]))
 
 
-def _law(path: Path, limits: MotionLimits, quantities: Quantities | None, grid: int, share: float) -> Spline:
-    """Path coordinate over time, within a share of the limits."""
+def _law(
+    path: Path, limits: MotionLimits, quantities: Quantities | None, affine: NDArray[np.bool_], grid: int, shares: Array
+) -> Spline:
+    """Path coordinate over time, within shares of the limits."""
     import toppra
     from toppra.algorithm import TOPPRA
 
     logging.getLogger("toppra").setLevel(logging.ERROR)
     points = np.linspace(0.0, 1.0, grid + 1)
     algorithm = TOPPRA(
-        _constraints(toppra.constraint, limits, quantities, share), _curve(path, points), gridpoints=points,
+        _constraints(toppra.constraint, limits, quantities, affine, shares), _curve(path, points), gridpoints=points,
         solver_wrapper="seidel", parametrizer="ParametrizeConstAccel",
     )  # fmt: skip
     algorithm.compute_parameterization(0.0, 0.0)
@@ -151,19 +160,40 @@ def _quadratic(points: Array, rates: Array) -> Spline:
     return Spline(knots=knots, coefficients=np.concatenate([points[:1], inner, points[-1:]]))
 
 
-def _constraints(constraint: Any, limits: MotionLimits, quantities: Quantities | None, share: float) -> list[Any]:
+def _affine(path: Path, limits: MotionLimits, quantities: Quantities) -> NDArray[np.bool_]:
+    """Which quantities are affine in s'² and s'' along the path. Shape (q,)."""
+    kept = np.ones(len(quantities.names), dtype=bool)
+    for s in np.linspace(0.0, 1.0, TRIED):
+        place, slope, bend = (path([s], order)[0] for order in range(3))
+        rate = float((limits.of(1) / np.maximum(np.abs(slope), 1e-12)).min())
+        gain = min(float((limits.of(2) / np.maximum(np.abs(slope), 1e-12)).min()), rate**2)
+
+        def value(v: float, a: float) -> Array:
+            curves = (place, slope * v, bend * v**2 + slope * a, np.zeros_like(place))  # noqa: B023
+            return np.array(quantities.function(*curves)).ravel()
+
+        still, fast = value(0.0, 0.0), value(rate, 0.0)
+        off = value(rate / 2, 0.0) - still - (fast - still) / 4
+        bent = value(rate, gain / 2) - fast - (value(rate, gain) - fast) / 2
+        kept &= np.maximum(np.abs(off), np.abs(bent)) <= AFFINE * quantities.scale
+    return kept
+
+
+def _constraints(
+    constraint: Any, limits: MotionLimits, quantities: Quantities | None, affine: NDArray[np.bool_], shares: Array
+) -> list[Any]:
     scheme = constraint.DiscretizationType.Interpolation
     found = []
     for kind, order in (("JointVelocityConstraint", 1), ("JointAccelerationConstraint", 2)):
-        size = np.minimum(share * limits.of(order), 1e6)
+        size = np.minimum(shares[0] * limits.of(order), 1e6)
         own = getattr(constraint, kind)(np.stack([-size, size], axis=1))
         if order == 2:
             own.set_discretization_type(scheme)
         found.append(own)
-    if quantities is not None:
-        inwards = (1.0 - share) * quantities.scale
+    if quantities is not None and affine.any():
+        inwards = (1.0 - shares[1]) * quantities.scale
         lower, upper = quantities.lower + inwards, quantities.upper - inwards
-        above, below = (np.flatnonzero(np.isfinite(ends)) for ends in (upper, lower))
+        above, below = (np.flatnonzero(np.isfinite(ends) & affine) for ends in (upper, lower))
         count = len(quantities.names)
         factors = np.concatenate([np.eye(count)[above], -np.eye(count)[below]])
         limit = np.concatenate([upper[above], -lower[below]])

@@ -70,6 +70,11 @@ class Spline:
         inside = np.clip(np.asarray(t, dtype=float), self.start, self.end)
         return np.asarray(BSpline(knots, points, self.degree - order)(inside))
 
+    def curves(self, t: ArrayLike) -> list[Array]:
+        """Position … jerk, zero above the degree. Each shape (len(t), n)."""
+        known = [self(t, order).reshape(np.size(t), -1) for order in range(min(4, self.degree + 1))]
+        return known + [np.zeros_like(known[0])] * (4 - len(known))
+
     def coordinate(self, index: int) -> Spline:
         """One coordinate of several."""
         return Spline(knots=self.knots, coefficients=self.coefficients[:, index])

@@ -15,6 +15,9 @@ from .spline import DEGREE
 
 Array = NDArray[np.float64]
 
+#: Share of a tolerance that is left to that of the solver.
+SOLVED = 1e-5
+
 
 @dataclass(frozen=True, kw_only=True)
 class Waypoint:
@@ -70,7 +73,7 @@ class Waypoint:
     def ends(self) -> tuple[Array, Array]:
         """Least and largest admissible entries of `value`; NaN where they are free."""
         value = np.asarray(self.value, dtype=float)
-        room = 0.0 if self.tolerance is None else np.asarray(self.tolerance, dtype=float)
+        room = 0.0 if self.tolerance is None else (1 - SOLVED) * np.asarray(self.tolerance, dtype=float)
         return value - room, value + room
 
     @property

@@ -118,7 +118,6 @@ def _motion(chosen: Any) -> Any:
     from trajectories import LimitViolatedError
 
     from ..errors import InvalidInputError
-    from ..motions.crane_task import ASSUMED
     from ..motions.from_study import motions_of
     from .progress import bar
 
@@ -128,14 +127,17 @@ def _motion(chosen: Any) -> Any:
             ways = motions_of(chosen, progress.update)
         except LimitViolatedError as error:
             raise InvalidInputError(f"{chosen.study.name}: {error}") from None
-    heads = ("time [s]", "energy [J]", "lost [J]", "effort [s]", "efficiency")
+    columns = [("energy", "energy [J]"), ("loss", "lost [J]"), ("effort", "effort [s]")]
+    columns = [(name, head) for name, head in columns if name in ways[0].totals]
+    heads = ("time [s]", *(head for _, head in columns), "efficiency")
     click.echo(f"{'motion':20}" + "".join(f"{head:>12}" for head in heads))
     for way in ways:
-        total, share = way.totals, way.efficiency
-        click.echo(
-            f"{way.name:20}{way.duration:12.4g}{total['energy']:12.5g}{total['loss']:12.5g}"
-            f"{total['effort']:12.3g}" + (f"{'-':>12}" if share is None else f"{share:12.3f}")
-        )
+        share = "-" if way.efficiency is None else f"{way.efficiency:.3f}"
+        costs = "".join(f"{way.totals[name]:12.5g}" for name, _ in columns)
+        click.echo(f"{way.name:20}{way.duration:12.4g}{costs}{share:>12}")
     click.echo("every motion is inside its limits for all t", err=True)
-    click.echo(f"assumed, to be replaced by yours: {', '.join(ASSUMED)}", err=True)
+    if chosen.reference.kind == "toppra":
+        click.echo("not limited, because the jerk is free: jerks, and quantities that depend on them", err=True)
+    if ways[0].job.mover.assumed:
+        click.echo(f"assumed, to be replaced by yours: {', '.join(ways[0].job.mover.assumed)}", err=True)
     return ways

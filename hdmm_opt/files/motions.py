@@ -9,9 +9,8 @@ import numpy as np
 
 from trajectories import Motion
 
-from ..machines.crane_dynamics import JOINTS
-from ..motions.crane_task import ASSUMED, drive_quantities
-from ..motions.sequence import Job, Motions
+from ..motions.mover import Mover
+from ..motions.sequence import Motions
 from ..study.motion import MotionStudy
 from .text import csv_text
 
@@ -22,21 +21,22 @@ STEP = 0.02
 
 def document(study: MotionStudy, ways: Sequence[Motions]) -> dict[str, Any]:
     """The study, and every motion with knots [s], control points [rad, rad, m], bounds for all t and costs."""
+    mover = ways[0].job.mover
     return {
         "schema": SCHEMA,
         "study": study.model_dump(mode="json", exclude_none=True),
-        "joints": list(JOINTS),
-        "assumed": list(ASSUMED),
+        "joints": list(mover.names),
+        "assumed": list(mover.assumed),
         "ways": [
             {
                 "name": way.name,
                 "duration_s": way.duration,
-                "energy_j": way.totals["energy"],
-                "lost_j": way.totals["loss"],
+                "energy_j": way.totals.get("energy"),
+                "lost_j": way.totals.get("loss"),
                 "effort_s": way.totals["effort"],
                 "efficiency": way.efficiency,
                 "moves": [
-                    _move(way.job, motion, move.payload)
+                    _move(motion, move.payload)
                     for motion, move in zip(way.motions, way.job.moves, strict=True)
                 ],
             }
@@ -45,9 +45,9 @@ def document(study: MotionStudy, ways: Sequence[Motions]) -> dict[str, Any]:
     }
 
 
-def _move(job: Job, motion: Motion, payload: float) -> dict[str, Any]:
-    quantities, peaks = drive_quantities(payload, job.obstacles, job.bounds), motion.peaks
-    assert peaks is not None
+def _move(motion: Motion, payload: float) -> dict[str, Any]:
+    quantities, peaks = motion.quantities, motion.peaks
+    assert peaks is not None and quantities is not None
     rows = zip(
         quantities.names, quantities.units, peaks.lower, peaks.upper, quantities.lower, quantities.upper, strict=True
     )
@@ -81,7 +81,8 @@ def _points(motion: Motion) -> list[dict[str, Any]]:
 def table(ways: Sequence[Motions]) -> str:
     """The points of all motions as CSV; the header carries the units."""
     orders = (("position", ""), ("speed", "/s"), ("acceleration", "/s^2"))
-    joints = list(zip(JOINTS, ("rad", "rad", "m"), strict=True))
+    mover: Mover = ways[0].job.mover
+    joints = list(zip(mover.names, mover.limits.units, strict=True))
     heads = [f"{joint} {what} [{unit}{per}]" for what, per in orders for joint, unit in joints]
     rows = [
         (way.name, k, p["time_from_start_s"], "" if p["waypoint"] is None else p["waypoint"],

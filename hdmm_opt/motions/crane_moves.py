@@ -15,7 +15,8 @@ from ..machines.crane_geometry import LIFT, TILT
 from ..machines.machine import Machine
 from ..study import Study
 from .crane_task import crane_cost
-from .sequence import Job, Move, carried_out
+from .job import Job, Move
+from .sequence import carried_out
 
 
 def crane_moves(study: Study, machine: Machine) -> list[list[Spline]]:

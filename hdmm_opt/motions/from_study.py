@@ -4,37 +4,56 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 from trajectories import Ball, HalfSpace, Obstacle
 
-from ..study.motion import LimitsSection, MotionStudy, ObstacleSection
-from .crane_task import Bounded, crane_cost
-from .sequence import Job, Motions, Move, carried_out
+from ..machines.registry import model
+from ..study.motion import LimitsSection, MotionStudy, MoveSection, ObstacleSection, PlaceSection
+from .arm_mover import arm_mover
+from .crane_task import crane_mover
+from .job import SPANS, Job, Move, Place
+from .mover import Bounded, Mover
+from .sequence import Motions, carried_out
 from .two_level import bilevel
 
 #: Decisions of the leader where a study gives none.
 EVALUATIONS = 24
+#: What the kinds of motion are called.
+NAMES = {"bspline": "spline program", "toppra": "TOPP-RA", "ruckig": "Ruckig"}
 
 
 def job_of(study: MotionStudy) -> Job:
     """The moves to make."""
     section = study.reference
     return Job(
-        start=section.start_rad_rad_m,
-        moves=tuple(
-            Move(
-                tool=m.tool_m,
-                joints=m.joints_rad_rad_m,
-                payload=m.payload_kg,
-                via=tuple(p.joints_rad_rad_m or p.tool_m or () for p in m.via),
-            )
-            for m in section.moves
-        ),
+        mover=_mover(study), start=section.start, speed=section.start_speed, acceleration=section.start_acceleration,
+        moves=tuple(_move(move) for move in section.moves),
         obstacles=tuple(_obstacle(entry) for entry in section.obstacles),
-        longest=section.longest_s,
-        least_lever=study.plant.least_lever_m_rad,
-        bounds=_bounds(section.limits),
-    )
+        longest=section.longest_s, bounds=_bounds(section.limits),
+    )  # fmt: skip
+
+
+def _mover(study: MotionStudy) -> Mover:
+    section = study.plant
+    if section.model == "crane":
+        return crane_mover() if section.least_lever_m_rad is None else crane_mover(section.least_lever_m_rad)
+    return arm_mover(model(section.model).build(section))
+
+
+def _place(section: PlaceSection) -> dict[str, Any]:
+    return {
+        "tool": section.tool_m, "angle": section.angle_rad, "joints": section.joints,
+        "tolerance": section.tolerance_m or 0.0, "angle_tolerance": section.angle_tolerance_rad or 0.0,
+        "joint_tolerance": section.tolerances,
+    }  # fmt: skip
+
+
+def _move(section: MoveSection) -> Move:
+    return Move(
+        **_place(section), via=tuple(Place(**_place(place)) for place in section.via), path=section.path_m,
+        speed=section.speed, payload=section.payload_kg,
+    )  # fmt: skip
 
 
 def _bounds(limits: LimitsSection) -> Bounded:
@@ -44,7 +63,7 @@ def _bounds(limits: LimitsSection) -> Bounded:
     }  # fmt: skip
     tool = (limits.tool_speed_m_s, limits.tool_acceleration_m_s2)
     return Bounded(
-        speed=limits.speed_rad_rad_m_s, acceleration=limits.acceleration_rad_rad_m_s2, jerk=limits.jerk_rad_rad_m_s3,
+        speed=limits.speed, acceleration=limits.acceleration, jerk=limits.jerk,
         drives=tuple((name, value) for name, value in drives.items() if value is not None),
         tool=(tool[0] or math.inf, tool[1] or math.inf),
     )  # fmt: skip
@@ -63,15 +82,20 @@ def motions_of(study: MotionStudy, progress: Callable[[float, str], None]) -> tu
     Raises:
         LimitViolatedError: a move that no motion inside the limits makes.
     """
-    section = study.reference
+    section, job = study.reference, job_of(study)
     if section.kind == "bilevel":
         budget = section.evaluations or EVALUATIONS
         return bilevel(
-            job_of(study), budget, lambda done, best: progress(done / budget, f"lost {best:.4g} J"),
-            spans=section.spans,
-        ).ways  # fmt: skip
+            job, budget, lambda done, best: progress(done / budget, f"lost {best:.4g} J"), spans=section.spans or SPANS
+        ).ways
     weights = {"time": 1.0} if section.cost is None else section.cost.model_dump()
-    found = carried_out(
-        job_of(study), lambda payload: crane_cost(payload=payload, **weights), "spline program", spans=section.spans
-    )
-    return (found,)
+
+    def done(number: int) -> None:
+        progress(number / len(job.moves), f"move {number} of {len(job.moves)}")
+
+    return (
+        carried_out(
+            job, lambda payload: job.mover.cost(payload=payload, **weights), NAMES[section.kind], kind=section.kind,
+            spans=section.spans, tick=done,
+        ),
+    )  # fmt: skip

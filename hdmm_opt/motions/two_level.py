@@ -22,7 +22,8 @@ from trajectories import LimitViolatedError, Motion, solve
 from ..errors import InvalidInputError
 from ..machines.crane_geometry import reach
 from .crane_task import crane_cost
-from .sequence import Job, Motions, carried_out
+from .job import SPANS, Job, Move
+from .sequence import Motions, carried_out
 
 Array = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ class Bilevel:
 
 
 def bilevel(
-    job: Job, evaluations: int = 40, tick: Callable[[int, float], None] | None = None, *, spans: int = 24
+    job: Job, evaluations: int = 40, tick: Callable[[int, float], None] | None = None, *, spans: int = SPANS
 ) -> Bilevel:
     """Solve a job on two levels, and by three single-level programs to compare with.
 
@@ -58,7 +59,7 @@ def bilevel(
         The motions. Every one is inside its limits for all t.
 
     Raises:
-        InvalidInputError: a move with places to pass.
+        InvalidInputError: a move with places to pass, a path or a speed, or with another machine than the crane.
         LimitViolatedError: a move that no motion inside the limits makes.
 
     References:
@@ -68,8 +69,11 @@ def bilevel(
 
     Not guaranteed: global optimality, on either level.
     """
-    if any(move.via for move in job.moves):
-        raise InvalidInputError('a bilevel move has no places to pass: got via; remove them, or use kind = "bspline"')
+    if any(move.via or move.path or move.speed for move in job.moves) or job.speed:
+        raise InvalidInputError(
+            'a bilevel move goes from rest to rest and has no places to pass: got via, a path or a speed; remove them, '
+            'or use kind = "bspline"'
+        )
     costs = (("time", {"time": 1.0}), ("effort", {"time": 0.0, "effort": 1.0}), ("energy", {"time": 0.0, "loss": 1e-3}))
     ways = [carried_out(job, _cost(weights), f"{name}-optimal", spans=spans) for name, weights in costs]
     leader = _Leader(job, ways, tick, spans)
@@ -143,15 +147,17 @@ class _Leader:
             iter(self.reach * decision[len(self.job.moves) :]),
         )
         for move, duration, led in zip(self.job.moves, durations, self.start.motions, strict=False):
-            end = np.array(move.joints) if move.tool is None else self.place(move.tool, next(extensions), led)
+            end = np.array(move.joints) if move.tool is None else self.place(move, next(extensions), led)
             cost = crane_cost(time=0.0, jerk=1.0, payload=move.payload)
-            task = self.job.task([at, end], move.payload, cost=cost, duration=float(duration), spans=self.spans)
+            task = self.job.task((at, end), move.payload, cost=cost, duration=float(duration), spans=self.spans)
             motions.append(solve(task))
             at = end
         return Motions(name="leader and follower", job=self.job, motions=tuple(motions))
 
-    def place(self, tool: Sequence[float], extension: float, led: Motion) -> Array:
+    def place(self, move: Move, extension: float, led: Motion) -> Array:
         """Joint coordinates at a place of the tool with an extension, near those the leader started from."""
+        tool = move.tool
+        assert tool is not None
         found = reach(tool, float(extension), led.spline.coefficients[-1])
         if found is None or not self.job.limits.holds(found):
             raise LimitViolatedError(

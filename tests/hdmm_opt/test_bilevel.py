@@ -12,10 +12,10 @@ from hdmm_opt.cli import main
 from hdmm_opt.errors import InvalidInputError
 from hdmm_opt.files.motions import document
 from hdmm_opt.machines.crane_geometry import tool as place
-from hdmm_opt.machines.crane_limits import joint_limits
 from hdmm_opt.motions.crane_task import crane_cost, drive_quantities, tool_function
 from hdmm_opt.motions.from_study import job_of
-from hdmm_opt.motions.sequence import Job, Move, carried_out
+from hdmm_opt.motions.job import Job, Move, Place
+from hdmm_opt.motions.sequence import carried_out
 from hdmm_opt.motions.two_level import bilevel
 from hdmm_opt.study import read as study
 from hdmm_opt.study.motion import MotionStudy
@@ -41,7 +41,7 @@ def test_every_motion_is_inside_its_limits_and_reaches_its_place(found):
     quantities = drive_quantities(60.0)
     for motions in found.ways:
         (motion,) = motions.motions
-        assert not violations(motion.spline, joint_limits(JOB.least_lever))
+        assert not violations(motion.spline, JOB.limits)
         values = quantities.values(motion.spline, np.linspace(0, motion.spline.end, 4001))
         assert (values <= quantities.upper[:, None]).all() and (values >= quantities.lower[:, None]).all()
         assert np.array(tool_function()(motion.spline.coefficients[-1])).ravel() == pytest.approx(PLACE, abs=1e-6)
@@ -97,7 +97,7 @@ name = "mine"
 model = "crane"
 [reference]
 kind = "bspline"
-start_rad_rad_m = [0.2, -1.2, 0.2]
+start = [0.2, -1.2, 0.2]
 longest_s = 40.0
 [reference.cost]
 time = 1.0
@@ -107,7 +107,7 @@ tool_m = [3.0, 2.2]
 via = [{ tool_m = [3.1, 1.2] }]
 payload_kg = 60.0
 [[reference.moves]]
-joints_rad_rad_m = [0.2, -1.2, 0.2]
+joints = [0.2, -1.2, 0.2]
 [[reference.obstacles]]
 name = "post"
 centre_m = [2.3, 1.4]
@@ -143,16 +143,16 @@ name = "own-limits"
 model = "crane"
 [reference]
 kind = "bspline"
-start_rad_rad_m = [0.2, -1.2, 0.2]
+start = [0.2, -1.2, 0.2]
 longest_s = 40.0
 spans = 12
 [reference.limits]
-speed_rad_rad_m_s = [0.3, 0.4, 0.1]
+speed = [0.3, 0.4, 0.1]
 current_a = 50.0
 tool_speed_m_s = 0.7
 [[reference.moves]]
 tool_m = [3.0, 2.2]
-via = [{ joints_rad_rad_m = [0.35, -1.0, 0.3] }, { tool_m = [3.1, 1.2] }]
+via = [{ joints = [0.35, -1.0, 0.3] }, { tool_m = [3.1, 1.2] }]
 payload_kg = 60.0
 """
 
@@ -187,15 +187,15 @@ def test_a_motion_keeps_the_limits_of_its_study_and_says_when_it_passes_its_wayp
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("start_rad_rad_m = [0.2", "start_rad_rad_m = [2.5", "must keep the lift between"),
-        ("joints_rad_rad_m = [0.2", "joints_rad_rad_m = [2.5", r"reference\.moves\.1\.joints_rad_rad_m must keep the lift"),
+        ("start = [0.2", "start = [2.5", "must keep the lift between"),
+        ("joints = [0.2", "joints = [2.5", r"reference\.moves\.1\.joints must keep the lift"),
         ("longest_s = 40.0", "longest = 40.0", 'did you mean "longest_s"'),
         ("longest_s = 40.0", "evaluations = 4", "evaluations has no place"),
-        ('kind = "bspline"', 'kind = "bilevel"', "has no cost and no via"),
+        ('kind = "bspline"', 'kind = "bilevel"', "has no cost, no via"),
         ("time = 1.0\neffort = 0.5", "time = 0.0", "needs one weight above zero"),
         ("radius_m = 0.3\n", "", "needs either centre_m and radius_m"),
         ("normal = [0.0, -1.0]", "normal = [0.0, -2.0]", "must have length 1"),
-        ("tool_m = [3.0, 2.2]", "", "needs either tool_m or joints_rad_rad_m"),
+        ("tool_m = [3.0, 2.2]", "", "needs tool_m, joints or path_m"),
     ],
 )  # fmt: skip
 def test_wrong_studies_say_what_would_do(old, new, message):
@@ -208,10 +208,10 @@ def test_what_cannot_be_done_names_the_move(tmp_path):
     far = Job(start=START, moves=(Move(tool=PLACE), Move(tool=(9.0, 9.0))))
     with pytest.raises(LimitViolatedError, match=r"move 2: no posture with the tool at \(9, 9\) m was found"):
         bilevel(far, 2)
-    with pytest.raises(InvalidInputError, match="one of the two"):
+    with pytest.raises(InvalidInputError, match="one of the three"):
         Move()
     with pytest.raises(InvalidInputError, match="no places to pass"):
-        bilevel(Job(start=START, moves=(Move(tool=PLACE, via=((3.0, 1.0),)),)), 2)
+        bilevel(Job(start=START, moves=(Move(tool=PLACE, via=(Place(tool=(3.0, 1.0)),)),)), 2)
     with pytest.raises(InvalidInputError, match="move 1: the joints go from one place to another"):
         bilevel(Job(start=START, moves=(Move(joints=START),)), 2)
     here = (float(place(START)[0]), float(place(START)[1]))
@@ -233,8 +233,8 @@ def test_a_move_to_nowhere_or_into_an_obstacle_is_refused_at_once():
     for move, words in (
         (Move(joints=(0.3, -1.2, 0.3 + 1e-15)), "they are at"),
         (Move(tool=(3.0, 1.1)), "keeps clear of post"),
-        (Move(tool=(3.2, 1.5), via=(here,)), "it is at"),
-        (Move(tool=(3.2, 1.5), via=((3.1, 1.0),)), "keeps clear of post"),
+        (Move(tool=(3.2, 1.5), via=(Place(tool=here),)), "it is at"),
+        (Move(tool=(3.2, 1.5), via=(Place(tool=(3.1, 1.0)),)), "keeps clear of post"),
     ):
         with pytest.raises(InvalidInputError, match=words):
             carried_out(Job(start=start, moves=(move,), obstacles=(post,)), lambda payload: crane_cost(), "none")
