@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class InvalidInputError(Exception):
     """Bad input: one line with the rule, what came, and what would do."""
@@ -19,6 +21,13 @@ class RefusedKeyError(InvalidInputError):
     def __init__(self, key: str, rule: str, remedy: str) -> None:
         super().__init__(f"{key} {rule}; {remedy}")
         self.key, self.rule, self.remedy = key, rule, remedy
+
+
+def refuse(found: Iterable[InvalidInputError]) -> None:
+    """Raise what was found, all at once, one line each; nothing where nothing was found."""
+    listed = list(dict.fromkeys(str(error) for error in found))
+    if listed:
+        raise InvalidInputError("\n".join(listed))
 
 
 class DefectError(Exception):

@@ -183,9 +183,10 @@ def _reject_rates(task: Task, which: str, waypoint: Waypoint) -> None:
         over = np.flatnonzero(sizes > limits * (1 - TIGHTENING / 2))
         if len(over):
             k = int(over[0])
+            unit = task.limits.unit(order, k)
             raise LimitViolatedError(
-                f"no motion: at the {which}, {task.limits.title(order, k)} is {sizes[k]:g} {task.limits.unit(order, k)}, "
-                f"its limit {limits[k]:g} {task.limits.unit(order, k)} less {50 * TIGHTENING:g} % in reserve: start it "
+                f"no motion: at the {which}, {task.limits.title(order, k)} is {sizes[k]:g} {unit}, "
+                f"its limit {limits[k]:g} {unit} less {50 * TIGHTENING:g} % in reserve: start it "
                 "slower, or widen that limit"
             )
 

@@ -100,7 +100,9 @@ def _node(
     # by the chain rule through position … jerk in time: half the instructions of differentiating by w
     inner, share = ca.vertcat(curves, slack), ca.SX.sym("share")
     slope, slopes = ca.jacobian(rate, inner), ca.jacobian(rows, inner)
-    first = ca.densify(ca.vertcat(share * slope.T + slopes.T @ weight, rate))  # of share * rate + weight' rows, by (inner, share)
+    first = ca.densify(
+        ca.vertcat(share * slope.T + slopes.T @ weight, rate)
+    )  # of share * rate + weight' rows, by (inner, share)
     second = ca.jacobian(first, ca.vertcat(inner, share))
     w = ca.vertcat(z, t, slack)
     outer = ca.vertcat(*(z[m * count : (m + 1) * count] / t**m for m in range(orders)), slack)

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 GRID = 400
 #: Share of the limits below which no further retiming is tried.
 LEAST_SHARE = 0.2
-#: A quantity is given to TOPP-RA where it is affine in s'² and s'' up to this share of its size; tried at so many places.
+#: TOPP-RA is told of a quantity that is affine in s'² and s'' up to this share of its size, at so many places.
 AFFINE, TRIED = 0.01, 9
 #: Retimings at the most, each inside tighter limits, until the composed motion is inside the given ones.
 ROUNDS = 6
@@ -37,8 +37,8 @@ class Retimed:
         law: Path coordinate over time: s' is continuous, s'' piecewise constant, so jerk is not limited.
         peaks: Bounds for all t of speeds, accelerations and quantities; all inside their limits.
         quantities: What `peaks` bounds.
-        share: The smaller of the shares of the limits that were left to TOPP-RA, of the coordinates and of the quantities
-            that it is given, so that everything is inside for all t.
+        share: The smaller of the shares of the limits that were left to TOPP-RA, of the coordinates and of the
+            quantities that it is told of, so that everything is inside for all t.
     """
 
     law: Spline

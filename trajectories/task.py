@@ -45,7 +45,9 @@ class Waypoint:
         if self.acceleration is not None and self.speed is None:
             raise ValueError("an acceleration stands beside a speed: got it alone; give the speed too")
         if self.tolerance is not None and not (np.asarray(self.tolerance) >= 0).all():
-            raise ValueError(f"a tolerance is not negative: got {np.asarray(self.tolerance).tolist()}; give none or more")
+            raise ValueError(
+                f"a tolerance is not negative: got {np.asarray(self.tolerance).tolist()}; give none or more"
+            )
         if self.through is not None and self.near is None:
             raise ValueError(
                 "a place that a function gives needs coordinates near it to start from: got none; give near"

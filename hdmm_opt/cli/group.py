@@ -66,7 +66,8 @@ class _Group(click.Group):
             return super().invoke(ctx)
         except InvalidInputError as error:
             given, text = ctx.meta.get(INPUT, ""), str(error)
-            click.echo(f"hdmm-opt: {text if given in text else f'{given}: {text}'}", err=True)
+            for line in text.splitlines() or [""]:
+                click.echo(f"hdmm-opt: {line if given in line else f'{given}: {line}'}", err=True)
             sys.exit(MISUSE)
         except DefectError as error:
             click.echo(f"hdmm-opt: DEFECT of the prover: {error}", err=True)

@@ -35,10 +35,7 @@ def document(study: MotionStudy, ways: Sequence[Motions]) -> dict[str, Any]:
                 "lost_j": way.totals.get("loss"),
                 "effort_s": way.totals["effort"],
                 "efficiency": way.efficiency,
-                "moves": [
-                    _move(motion, move.payload)
-                    for motion, move in zip(way.motions, way.job.moves, strict=True)
-                ],
+                "moves": [_move(motion, move.payload) for motion, move in zip(way.motions, way.job.moves, strict=True)],
             }
             for way in ways
         ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -125,26 +126,33 @@ def _urdf(name: str) -> str:
         raise InvalidInputError(f"plant.urdf: cannot read {name}: {reason}; check the path") from None
 
 
-def _check(section: Any) -> None:
+def _check(section: Any) -> Iterator[RefusedKeyError]:
     elsewhere = ("parameters", "ratings", "limits", *STROKE.values())
-    no_place(section, ("level", "locked", "least_lever_m_rad", *elsewhere), "arm")
+    yield from no_place(section, ("level", "locked", "least_lever_m_rad", *elsewhere), "arm")
     if section.urdf is None:
-        raise RefusedKeyError("urdf", 'is required with model = "arm"', 'give a bundled name ("crane") or a path')
+        yield RefusedKeyError("urdf", 'is required with model = "arm"', 'give a bundled name ("crane") or a path')
     if not section.joints:
-        raise RefusedKeyError("joints", "needs the joints of the arm, from the ground on", "give each a section")
+        yield RefusedKeyError("joints", "needs the joints of the arm, from the ground on", "give each a section")
     for name, drive in section.joints.items():
-        for part, keys in (("parameters", ("armature",)), ("limits", ("torque", "speed"))):
-            for key in keys:
-                if key not in getattr(drive, part):
-                    raise RefusedKeyError(f"joints.{name}.{part}.{key}", "is required for a joint of an arm", "add it")
-            for key in getattr(drive, part):
-                if key not in keys and not (part == "parameters" and key == "damping"):
-                    rule = "has no place in a joint of an arm"
-                    raise RefusedKeyError(f"joints.{name}.{part}.{key}", rule, nearest(key, keys))
+        yield from _of_joint(name, drive)
+
+
+def _of_joint(name: str, drive: Any) -> Iterator[RefusedKeyError]:
+    complete = True
+    for part, keys in (("parameters", ("armature",)), ("limits", ("torque", "speed"))):
+        for key in keys:
+            if key not in getattr(drive, part):
+                complete = False
+                yield RefusedKeyError(f"joints.{name}.{part}.{key}", "is required for a joint of an arm", "add it")
+        for key in getattr(drive, part):
+            if key not in keys and not (part == "parameters" and key == "damping"):
+                rule = "has no place in a joint of an arm"
+                yield RefusedKeyError(f"joints.{name}.{part}.{key}", rule, nearest(key, keys))
+    if complete:
         armature, torque = drive.parameters["armature"], drive.limits["torque"]
         if not (armature.value >= 0 and torque.value > 0 and drive.limits["speed"].value > 0):
             rule = "needs a torque and a speed above 0 and an armature of 0 or more"
-            raise RefusedKeyError(f"joints.{name}", rule, "correct the values")
+            yield RefusedKeyError(f"joints.{name}", rule, "correct the values")
 
 
 def _build(section: Any) -> Machine:

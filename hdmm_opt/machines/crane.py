@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -67,29 +67,31 @@ def _members(section: Any) -> tuple[str, ...]:
     return tuple(name for name in JOINTS if name not in section.locked)
 
 
-def _check(section: Any) -> None:
-    no_place(section, ("urdf", "tip_m", "damping"), "crane")
+def _check(section: Any) -> Iterator[RefusedKeyError]:
+    yield from no_place(section, ("urdf", "tip_m", "damping"), "crane")
     if section.level not in (None, "voltage"):
-        raise RefusedKeyError("level", f'of the crane is "voltage": got {section.level!r}', "leave it out")
+        yield RefusedKeyError("level", f'of the crane is "voltage": got {section.level!r}', "leave it out")
     known = {name: p for name, p in defaults("voltage").items() if name != "load_mass"}
     for where, names in (("joints", section.joints), ("locked", section.locked)):
         for name in names:
             if name not in JOINTS:
-                raise RefusedKeyError(f"{where}.{name}", "is not a joint of the crane", nearest(name, JOINTS))
+                yield RefusedKeyError(f"{where}.{name}", "is not a joint of the crane", nearest(name, JOINTS))
+    if any(name not in JOINTS for name in (*section.joints, *section.locked)):
+        return
     if len(section.locked) == len(JOINTS):
-        raise RefusedKeyError("locked", "must leave a joint that moves: got all of them", "unlock one")
+        yield RefusedKeyError("locked", "must leave a joint that moves: got all of them", "unlock one")
     for name, stroke in section.locked.items():
         if not 0 <= stroke <= STROKES[name]:
             rule = f"is a stroke from 0 to {STROKES[name]:g} m: got {stroke:g}"
-            raise RefusedKeyError(f"locked.{name}", rule, "correct it")
+            yield RefusedKeyError(f"locked.{name}", rule, "correct it")
     blank = pmsm_emla("voltage")
-    check_parameters("parameters", section.parameters, known, "an EMLA of the crane", blank)
-    check_numbers("", section, blank, stroke=False)
+    yield from check_parameters("parameters", section.parameters, known, "an EMLA of the crane", blank)
+    yield from check_numbers("", section, blank, stroke=False)
     for name, drive in section.joints.items():
-        check_parameters(f"joints.{name}.parameters", drive.parameters, known, "an EMLA of the crane", blank)
-        check_numbers(f"joints.{name}.", drive, blank)
+        yield from check_parameters(f"joints.{name}.parameters", drive.parameters, known, "an EMLA of the crane", blank)
+        yield from check_numbers(f"joints.{name}.", drive, blank)
         if drive.least_effectiveness is not None:
-            raise RefusedKeyError(f"joints.{name}.least_effectiveness", "has no place at voltage level", "remove it")
+            yield RefusedKeyError(f"joints.{name}.least_effectiveness", "has no place at voltage level", "remove it")
 
 
 def _build(section: Any) -> Machine:

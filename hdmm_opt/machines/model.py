@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,13 +18,13 @@ class Model:
 
     Attributes:
         members: Section -> names of the members.
-        check: Refuses a section that does not fit, with `RefusedKeyError`.
+        check: Section -> the keys that do not fit.
         build: Section -> the machine.
         kinds: Kinds of reference that it can follow.
     """
 
     members: Callable[[Any], tuple[str, ...]]
-    check: Callable[[Any], None]
+    check: Callable[[Any], Iterator[RefusedKeyError]]
     build: Callable[[Any], Machine]
     kinds: tuple[str, ...]
 
@@ -112,8 +112,8 @@ def numbers_of(plant: Plant, given: Numbers) -> Plant:
 def check_parameters(
     where: str, parameters: Mapping[str, Any], known: Mapping[str, Parameter], what: str,
     plant: Plant,
-) -> None:  # fmt: skip
-    """Refuse parameters that a plant does not have, in other units, or of the wrong sign.
+) -> Iterator[RefusedKeyError]:  # fmt: skip
+    """Parameters that a plant does not have, in other units, or of the wrong sign.
 
     Args:
         where: Place of the section.
@@ -127,19 +127,20 @@ def check_parameters(
             elsewhere = _elsewhere(name, plant)
             if elsewhere not in ("", "parameters"):
                 rule = f"is not a parameter of {what}, but one of its {elsewhere}"
-                raise RefusedKeyError(f"{where}.{name}", rule, f"write plant.{elsewhere}.{name}")
-            raise RefusedKeyError(f"{where}.{name}", f"is not a parameter of {what}", nearest(name, known))
-        if p.unit != known[name].unit:
+                yield RefusedKeyError(f"{where}.{name}", rule, f"write plant.{elsewhere}.{name}")
+            else:
+                yield RefusedKeyError(f"{where}.{name}", f"is not a parameter of {what}", nearest(name, known))
+        elif p.unit != known[name].unit:
             rule = f'must be "{known[name].unit}": got "{p.unit}"'
-            raise RefusedKeyError(f"{where}.{name}.unit", rule, f"convert the value: {known[name].meaning}")
-        if known[name].loss and not p.value >= 0:
-            raise RefusedKeyError(f"{where}.{name}.value", f"must be 0 or more: got {p.value:g}", "correct the sign")
-        if known[name].value > 0 and not known[name].loss and not p.value > 0:
-            raise RefusedKeyError(f"{where}.{name}.value", f"must be positive: got {p.value:g}", "correct the sign")
+            yield RefusedKeyError(f"{where}.{name}.unit", rule, f"convert the value: {known[name].meaning}")
+        elif known[name].loss and not p.value >= 0:
+            yield RefusedKeyError(f"{where}.{name}.value", f"must be 0 or more: got {p.value:g}", "correct the sign")
+        elif known[name].value > 0 and not known[name].loss and not p.value > 0:
+            yield RefusedKeyError(f"{where}.{name}.value", f"must be positive: got {p.value:g}", "correct the sign")
 
 
-def check_numbers(where: str, section: Any, plant: Plant, *, stroke: bool = True) -> None:
-    """Refuse limits and ratings that a plant does not have or in other units, and a stroke without length.
+def check_numbers(where: str, section: Any, plant: Plant, *, stroke: bool = True) -> Iterator[RefusedKeyError]:
+    """Limits and ratings that a plant does not have or in other units, and a stroke without length.
 
     Args:
         where: Place of the section, with a dot behind it; empty for `[plant]` itself.
@@ -156,19 +157,20 @@ def check_numbers(where: str, section: Any, plant: Plant, *, stroke: bool = True
                 elsewhere = _elsewhere(name, plant)
                 rule = f"is not a {what} of this plant" + (f", but one of its {elsewhere}" if elsewhere else "")
                 remedy = f"write plant.{elsewhere}.{name}" if elsewhere else nearest(name, known)
-                raise RefusedKeyError(f"{where}{kind}.{name}", rule, remedy)
+                yield RefusedKeyError(f"{where}{kind}.{name}", rule, remedy)
+                continue
             unit, meaning = known[name]
             if entry.unit != unit:
                 rule = f'must be "{unit}": got "{entry.unit}"'
-                raise RefusedKeyError(f"{where}{kind}.{name}.unit", rule, f"convert the value: {meaning}")
+                yield RefusedKeyError(f"{where}{kind}.{name}.unit", rule, f"convert the value: {meaning}")
     for unit, key in STROKE.items():
         given = getattr(section, key)
         if given is not None and (not stroke or unit != plant.state_units[0]):
             rule = f"has no place here: the first state of this plant is in {plant.state_units[0]}"
             remedy = f"give {STROKE[plant.state_units[0]]}" + ("" if stroke else " with its joint")
-            raise RefusedKeyError(f"{where}{key}", rule, remedy)
-        if given is not None and not given[0] < given[1]:
-            raise RefusedKeyError(f"{where}{key}", f"needs lower < upper: got {list(given)}", "correct them")
+            yield RefusedKeyError(f"{where}{key}", rule, remedy)
+        elif given is not None and not given[0] < given[1]:
+            yield RefusedKeyError(f"{where}{key}", f"needs lower < upper: got {list(given)}", "correct them")
 
 
 def _elsewhere(name: str, plant: Plant) -> str:
@@ -179,9 +181,9 @@ def _elsewhere(name: str, plant: Plant) -> str:
     return next((kind for kind in KINDS if name in known[kind]), "")
 
 
-def no_place(section: Any, keys: tuple[str, ...], name: str) -> None:
-    """Refuse keys that a model does not read."""
+def no_place(section: Any, keys: tuple[str, ...], name: str) -> Iterator[RefusedKeyError]:
+    """Keys that a model does not read."""
     for key in keys:
         value = getattr(section, key)
         if value not in (None, {}, (), ""):
-            raise RefusedKeyError(key, f'has no place with model = "{name}"', "remove it")
+            yield RefusedKeyError(key, f'has no place with model = "{name}"', "remove it")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import casadi as ca
@@ -26,23 +27,24 @@ def single(name: str, plant: PlantModel) -> Model:
         plant: How it is made.
     """
 
-    def check(section: Any) -> None:
-        no_place(section, _ELSEWHERE, name)
+    def check(section: Any) -> Iterator[RefusedKeyError]:
+        yield from no_place(section, _ELSEWHERE, name)
         if section.level not in plant.levels:
-            raise RefusedKeyError("level", f"is one of {', '.join(plant.levels)}: got {section.level!r}", "choose one")
+            yield RefusedKeyError("level", f"is one of {', '.join(plant.levels)}: got {section.level!r}", "choose one")
+            return
         for member in section.joints:
             if member != MEMBER:
-                raise RefusedKeyError(f"joints.{member}", "is not a member of this machine", nearest(member, [MEMBER]))
+                yield RefusedKeyError(f"joints.{member}", "is not a member of this machine", nearest(member, [MEMBER]))
         known, own = plant.defaults(section.level), section.joints.get(MEMBER)
         blank = plant.build(section.level, {}, {})
-        check_parameters("parameters", section.parameters, known, name, blank)
-        check_numbers("", section, blank)
+        yield from check_parameters("parameters", section.parameters, known, name, blank)
+        yield from check_numbers("", section, blank)
         if own is not None:
-            check_parameters(f"joints.{MEMBER}.parameters", own.parameters, known, name, blank)
-            check_numbers(f"joints.{MEMBER}.", own, blank)
+            yield from check_parameters(f"joints.{MEMBER}.parameters", own.parameters, known, name, blank)
+            yield from check_numbers(f"joints.{MEMBER}.", own, blank)
             if own.least_effectiveness is not None and EFFECTIVENESS not in known:
                 rule = f'has no place with level = "{section.level}"'
-                raise RefusedKeyError(f"joints.{MEMBER}.least_effectiveness", rule, "remove it")
+                yield RefusedKeyError(f"joints.{MEMBER}.least_effectiveness", rule, "remove it")
 
     def build(section: Any) -> Machine:
         numbers = Numbers.of(section, MEMBER)

@@ -85,8 +85,7 @@ def _checked(job: Job, spline: Spline, quantities: Quantities, cost: Any, *, jer
     found = peaks(spline, quantities)
     if not found.inside:
         worst = int((found.excess.max(axis=1) / quantities.scale).argmax())
-        raise LimitViolatedError(
-            f"{quantities.names[worst]} is up to {found.excess[worst].max():.3g} {quantities.units[worst]} outside its limit"
-        )
+        excess = f"{found.excess[worst].max():.3g} {quantities.units[worst]}"
+        raise LimitViolatedError(f"{quantities.names[worst]} is up to {excess} outside its limit")
     task = job.task((spline.coefficients[0], spline.coefficients[-1]), 0.0, cost=cost, quantities=quantities)
     return motion_of(task, spline, (spline.end,), found)

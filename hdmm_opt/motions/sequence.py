@@ -95,9 +95,8 @@ def _going_somewhere(job: Job, move: Move, at: State) -> None:
         for obstacle in job.obstacles if place.joints is None else ():
             clear = float(obstacle.clearance(there))
             if clear < 0:
-                raise ValueError(
-                    f"the tool keeps clear of {obstacle.name}: {job.mover.said(there.tolist())} is {-clear:.3g} m inside"
-                )
+                said = job.mover.said(there.tolist())
+                raise ValueError(f"the tool keeps clear of {obstacle.name}: {said} is {-clear:.3g} m inside")
 
 
 def carried_out(

@@ -71,7 +71,7 @@ def bilevel(
     """
     if any(move.via or move.path or move.speed for move in job.moves) or job.speed:
         raise InvalidInputError(
-            'a bilevel move goes from rest to rest and has no places to pass: got via, a path or a speed; remove them, '
+            "a bilevel move goes from rest to rest and has no places to pass: got via, a path or a speed; remove them, "
             'or use kind = "bspline"'
         )
     costs = (("time", {"time": 1.0}), ("effort", {"time": 0.0, "effort": 1.0}), ("energy", {"time": 0.0, "loss": 1e-3}))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from stability.networks.observer import SampledObserver, sampled_bounds
 from trajectories import Reference
 
 from ..control.registry import law_for
-from ..errors import InvalidInputError
+from ..errors import InvalidInputError, refuse
 from ..machines.machine import Machine
 from ..machines.registry import model
 from ..motions.references import references as made_references
@@ -43,15 +43,15 @@ def assemble(study: Study, references: tuple[Reference, ...] | None = None) -> P
         InvalidInputError: an unreachable reference, or sections that do not fit each other.
     """
     machine = model(study.plant.model).build(study.plant)
-    _check_disturbances(study, machine)
-    _check_scenarios(study, machine)
-    _check_rates(study, machine)
-    noise = {m: _by_state("uncertainty.noise", study.uncertainty.noise, machine, k)
-             for k, m in enumerate(machine.members)}  # fmt: skip
-    initial = {m: _by_state("uncertainty.initial", study.uncertainty.initial, machine, k)
-               for k, m in enumerate(machine.members)}  # fmt: skip
-    _same_everywhere(machine, noise, "noise")
-    _same_everywhere(machine, initial, "initial")
+    sections = {"noise": study.uncertainty.noise, "initial": study.uncertainty.initial}
+    refuse([
+        *_check_disturbances(study, machine), *_check_scenarios(study, machine), *_check_rates(study, machine),
+        *(error for kind, given in sections.items() for error in _check_states(f"uncertainty.{kind}", given, machine)),
+    ])  # fmt: skip
+    noise, initial = (
+        {m: _by_state(given, machine, k) for k, m in enumerate(machine.members)} for given in sections.values()
+    )
+    refuse([*_same_everywhere(machine, noise, "noise"), *_same_everywhere(machine, initial, "initial")])
     laws = {m: law_for(study.controller.law, p, study.controller.modelling)
             for m, p in zip(machine.members, machine.plants, strict=True)}  # fmt: skip
     given = {m: _gains_of(study, m) for m in machine.members}
@@ -85,33 +85,35 @@ def assemble(study: Study, references: tuple[Reference, ...] | None = None) -> P
     )
 
 
-def _check_disturbances(study: Study, machine: Machine) -> None:
+def _check_disturbances(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
     """The study's disturbances are those of the machine."""
     given, known = study.uncertainty.disturbances, [d.name for d in machine.disturbances]
     for name in given:
         if name not in known:
-            raise InvalidInputError(f'unknown key "uncertainty.disturbances.{name}"; {nearest(name, known)}')
+            yield InvalidInputError(f'unknown key "uncertainty.disturbances.{name}"; {nearest(name, known)}')
     for disturbance in machine.disturbances:
         name = disturbance.name
+        if name not in given and set(given) <= set(known):
+            yield InvalidInputError(f'"uncertainty.disturbances.{name}" is required and missing; give its range')
         if name not in given:
-            raise InvalidInputError(f'"uncertainty.disturbances.{name}" is required and missing; give its range')
+            continue
         low, high = given[name].range
         if given[name].unit not in (None, disturbance.unit):
-            raise InvalidInputError(
+            yield InvalidInputError(
                 f'uncertainty.disturbances.{name}.unit must be "{disturbance.unit}": got "{given[name].unit}"; '
                 "convert the range"
             )
         if machine.forces is None and low == high:
-            raise InvalidInputError(
+            yield InvalidInputError(
                 f"uncertainty.disturbances.{name} is an empty range: got [{low:g}, {high:g}]; widen it"
             )
         if disturbance.course == "constant" and (low < 0 or given[name].course == "any"):
-            raise InvalidInputError(
+            yield InvalidInputError(
                 f"uncertainty.disturbances.{name} is a constant of 0 or more: got [{low:g}, {high:g}]; correct it"
             )
 
 
-def _check_scenarios(study: Study, machine: Machine) -> None:
+def _check_scenarios(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
     """Scenarios name parameters that there are, and faults that fit the inputs."""
     pairs = list(zip(machine.members, machine.plants, strict=True))
     known = {key for _, plant in pairs for key in plant.parameters}
@@ -121,26 +123,26 @@ def _check_scenarios(study: Study, machine: Machine) -> None:
         where = f"validation.scenarios.{scenario.name}"
         for name in scenario.parameters:
             if name not in known:
-                raise InvalidInputError(f"{where}.parameters.{name} is unknown; {nearest(name, sorted(known))}")
+                yield InvalidInputError(f"{where}.parameters.{name} is unknown; {nearest(name, sorted(known))}")
         for name, course in scenario.disturbances.items():
             if name in constants and len({value for _, value in course}) > 1:
-                raise InvalidInputError(f"{where}.disturbances.{name} is constant in a run; give one number")
+                yield InvalidInputError(f"{where}.disturbances.{name} is constant in a run; give one number")
         for name, plant in pairs:
             stuck = scenario.faults[name].stuck if name in scenario.faults else ()
             if len(stuck) > len(plant.inputs):
-                raise InvalidInputError(
+                yield InvalidInputError(
                     f"{where}.faults.{name}.stuck has at most one entry for each of "
                     f"{', '.join(plant.inputs)}: got {len(stuck)}; remove what is too much"
                 )
 
 
-def _check_rates(study: Study, machine: Machine) -> None:
+def _check_rates(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
     """All control rates divide the fastest one."""
     rates = {name: study.controller.rate_of(name) for name in machine.members}
     fastest = max(rates.values())
     for name, rate in rates.items():
         if abs(round(fastest / rate) * rate / fastest - 1) > 1e-9:
-            raise InvalidInputError(
+            yield InvalidInputError(
                 f"controller.rates_hz.{name} must divide the fastest rate, {fastest:g} Hz: got {rate:g}; "
                 f"{fastest / round(fastest / rate):g} would do"
             )
@@ -167,24 +169,30 @@ def state_key(plant: Plant, state: str) -> str:
     return f"{state}_{_SUFFIX[plant.state_units[plant.states.index(state)]]}"
 
 
-def _by_state(section: str, given: Mapping[str, float], machine: Machine, k: int) -> tuple[float, ...]:
-    """Values of a member's states; a key is the name of a state, alone or with its unit."""
-    known = [key for plant in machine.plants for s in plant.states for key in (state_key(plant, s), s)]
+def _check_states(section: str, given: Mapping[str, float], machine: Machine) -> Iterator[InvalidInputError]:
+    """Keys are names of states, alone or with their unit."""
+    shown = list(dict.fromkeys(state_key(plant, s) for plant in machine.plants for s in plant.states))
+    known = [*shown, *(s for plant in machine.plants for s in plant.states)]
     for name in given:
         if name not in known:
-            shown = list(dict.fromkeys(state_key(machine.plants[k], s) for s in machine.plants[k].states))
-            raise InvalidInputError(f'unknown key "{section}.{name}"; {nearest(name, shown)}')
+            yield InvalidInputError(f'unknown key "{section}.{name}"; {nearest(name, shown)}')
+
+
+def _by_state(given: Mapping[str, float], machine: Machine, k: int) -> tuple[float, ...]:
+    """Values of a member's states."""
     plant = machine.plants[k]
     return tuple(given.get(state_key(plant, s), given.get(s, 0.0)) for s in plant.states)
 
 
-def _same_everywhere(machine: Machine, values: Mapping[str, tuple[float, ...]], kind: str) -> None:
+def _same_everywhere(
+    machine: Machine, values: Mapping[str, tuple[float, ...]], kind: str
+) -> Iterator[InvalidInputError]:
     """States of one name have one bound in all members."""
     found: dict[str, float] = {}
     for name, plant in zip(machine.members, machine.plants, strict=True):
         for state, value in zip(plant.states, values[name], strict=True):
             if found.setdefault(state, value) != value:
-                raise InvalidInputError(
+                yield InvalidInputError(
                     f'uncertainty.{kind} gives "{state}" in two units: got {found[state]:g} and {value:g}; '
                     "name it once, without a unit"
                 )

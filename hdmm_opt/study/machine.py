@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from ..errors import RefusedKeyError
 from ..machines.registry import model
-from .messages import refused
+from .messages import refused, refused_together
 from .sections import LimitSection, Name, NonNegative, Pair, ParameterSection, Section
 
 
@@ -49,9 +49,10 @@ class PlantSection(NumberSection):
     @model_validator(mode="after")
     def _fitting(self) -> PlantSection:
         try:
-            model(self.model).check(self)
+            found = list(model(self.model).check(self))
         except RefusedKeyError as error:
-            raise refused(error.key, error.rule, error.remedy) from None
+            found = [error]
+        refused_together(found)
         return self
 
 

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticCustomError
 
+from ..errors import RefusedKeyError
 from ..names import nearest
+
+#: Problems of a file that are listed at once.
+SHOWN = 12
 
 
 def refused(key: str, rule: str, remedy: str) -> PydanticCustomError:
@@ -22,10 +27,42 @@ def refused(key: str, rule: str, remedy: str) -> PydanticCustomError:
     return PydanticCustomError("refused", "{rule}; {remedy}", {"key": key, "rule": rule, "remedy": remedy})
 
 
-def one_line(error: ValidationError, whole: type[BaseModel]) -> str:
-    """The first problem of a file as one line."""
-    problems = error.errors()
-    first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
+def refused_together(found: Iterable[RefusedKeyError]) -> None:
+    """Raise the error of a validator for all keys that do not fit; nothing where all do."""
+    keys = [(error.key, error.rule, error.remedy) for error in found]
+    if keys:
+        raise PydanticCustomError("refused", "{keys}", {"keys": keys})
+
+
+def lines(error: ValidationError, whole: type[BaseModel]) -> list[str]:
+    """The problems of a file, one line each: unknown keys first, because others follow from them."""
+    problems = sorted(error.errors(), key=lambda p: p["type"] != "extra_forbidden")
+    meant = [p["loc"][:-1] + (nearest_of(p, whole),) for p in problems if p["type"] == "extra_forbidden"]
+    problems = [p for p in problems if not (p["type"] == "missing" and p["loc"] in meant)]
+    inner = {p["loc"][:k] for p in problems for k in range(len(p["loc"]))}
+    problems = [p for p in problems if not (p["type"] == "too_short" and p["loc"] in inner)]
+    found = [line for problem in problems for line in _lines(problem, whole)]
+    listed = list(dict.fromkeys(found))
+    more = len(listed) - SHOWN
+    return listed if more <= 0 else [*listed[:SHOWN], f"{more} more; correct these first"]
+
+
+def nearest_of(problem: Any, whole: type[BaseModel]) -> str:
+    """The key that an unknown one was meant to be; empty where none is near."""
+    place = [str(part) for part in problem["loc"]]
+    words = nearest(place[-1], _known_keys(whole, place[:-1])).split('"')
+    return words[1] if len(words) == 3 else ""
+
+
+def _lines(problem: Any, whole: type[BaseModel]) -> list[str]:
+    path = ".".join(str(part) for part in problem["loc"])
+    context = problem.get("ctx", {})
+    if problem["type"] == "refused" and "keys" in context:
+        return [f"{'.'.join(p for p in (path, key) if p)} {rule}; {remedy}" for key, rule, remedy in context["keys"]]
+    return [_line(problem, whole)]
+
+
+def _line(first: Any, whole: type[BaseModel]) -> str:
     place = [str(part) for part in first["loc"]]
     path, kind, value = ".".join(place), first["type"], first["input"]
     shown = repr(value) if isinstance(value, str) else f"{value}"

@@ -128,8 +128,10 @@ class CostSection(Section):
 
 
 class JobSection(Section):
-    """The moves, and how their motions are chosen: a spline program, straight between joint coordinates by TOPP-RA or
-    Ruckig, or a leader and a follower."""
+    """The moves, and how their motions are chosen.
+
+    By a spline program, straight between joint coordinates by TOPP-RA or Ruckig, or by a leader and a follower.
+    """
 
     kind: Literal["bspline", "toppra", "ruckig", "bilevel"]
     start: Joints
@@ -234,7 +236,8 @@ class MotionStudy(Section):
                 raise refused(f"reference.limits.{key}", "has no place with an arm", "give plant.joints.NAME.limits")
         for where, place in reference.places():
             if place.angle_rad is not None:
-                raise refused(f"reference.{where}.angle_rad", "has no place with an arm: its tool is a point", "remove it")
+                rule = "has no place with an arm: its tool is a point"
+                raise refused(f"reference.{where}.angle_rad", rule, "remove it")
         cost = reference.cost
         if cost is not None and (cost.energy or cost.loss):
             raise refused("reference.cost", "of an arm has no energy and no loss", "use time, jerk or effort")

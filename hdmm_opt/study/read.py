@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from ..errors import InvalidInputError
 from ..names import nearest
 from ..plants.own import allow, own_name
-from .messages import one_line
+from .messages import lines
 from .motion import MotionStudy
 from .sections import LARGEST
 from .study import Study
@@ -125,7 +125,7 @@ def _validated(data: dict[str, Any], where: str, kind: type[T]) -> T:
     try:
         return kind.model_validate(data)
     except ValidationError as error:
-        raise InvalidInputError(f"{where}: {one_line(error, kind)}") from None
+        raise InvalidInputError("\n".join(f"{where}: {line}" for line in lines(error, kind))) from None
 
 
 def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:

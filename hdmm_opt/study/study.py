@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from pydantic import model_validator
 
+from ..errors import RefusedKeyError
 from ..machines.registry import model
 from ..names import nearest
 from .controller import ControllerSection, TuningSection
 from .machine import PlantSection, UncertaintySection
-from .messages import refused
+from .messages import refused_together
 from .reference import ReferenceSection
 from .sections import Section, StudySection
 from .validation import RequirementSection, ValidationSection, check_names
@@ -34,15 +37,16 @@ class Study(Section):
     @model_validator(mode="after")
     def _consistent(self) -> Study:
         check_names(scenario.name for scenario in self.validation.scenarios)
-        self._members()
-        self._courses()
+        refused_together([*self._members(), *self._courses(), *self._kind()])
+        return self
+
+    def _kind(self) -> Iterator[RefusedKeyError]:
         kinds = model(self.plant.model).kinds
         if self.reference.kind not in kinds:
             wanted = " or ".join(f'"{kind}"' for kind in kinds)
-            raise refused("reference.kind", f'is {wanted} for model = "{self.plant.model}"', "change it")
-        return self
+            yield RefusedKeyError("reference.kind", f'is {wanted} for model = "{self.plant.model}"', "change it")
 
-    def _members(self) -> None:
+    def _members(self) -> Iterator[RefusedKeyError]:
         members = self.members
         named = [(f"controller.members.{name}", name) for name in self.controller.members]
         named += [(f"controller.rates_hz.{name}", name) for name in self.controller.rates_hz]
@@ -51,24 +55,28 @@ class Study(Section):
             named += [(f"validation.scenarios.{scenario.name}.faults.{name}", name) for name in scenario.faults]
         for where, name in named:
             if name not in members:
-                raise refused(where, "is not a member of this machine", nearest(name, members))
+                yield RefusedKeyError(where, "is not a member of this machine", nearest(name, members))
         for name in members if len(members) > 1 else ():
             if name not in self.requirements.member_error:
-                raise refused(f"requirements.member_error.{name}", "is required and missing", "add it")
+                yield RefusedKeyError(f"requirements.member_error.{name}", "is required and missing", "add it")
         count = len(self.reference.waypoints[0])
         if count != len(members):
             rule = f"must have one entry for each of {', '.join(members)}: got {count}"
-            raise refused("reference.waypoints", rule, "complete them")
+            yield RefusedKeyError("reference.waypoints", rule, "complete them")
 
-    def _courses(self) -> None:
-        ranges = self.uncertainty.disturbances
+    def _courses(self) -> Iterator[RefusedKeyError]:
+        ranges, unknown = self.uncertainty.disturbances, set()
         for scenario in self.validation.scenarios:
             for name, course in scenario.disturbances.items():
                 where = f"validation.scenarios.{scenario.name}.disturbances.{name}"
+                if name not in ranges and name in unknown:
+                    continue
                 if name not in ranges:
-                    raise refused(where, "is not a disturbance of the study", nearest(name, ranges))
+                    unknown.add(name)
+                    yield RefusedKeyError(where, "is not a disturbance of the study", nearest(name, ranges))
+                    continue
                 low, high = ranges[name].range
                 outside = [value for _, value in course if not low <= value <= high]
                 if outside and low < high:  # an empty range is refused where the machine is known
                     rule = f"must stay inside uncertainty.disturbances.{name} [{low:g}, {high:g}]: got {outside[0]:g}"
-                    raise refused(where, rule, "widen the assumption or change the scenario")
+                    yield RefusedKeyError(where, rule, "widen the assumption or change the scenario")

@@ -169,6 +169,37 @@ def _exp(a: Pair) -> Pair:
     return np.maximum(low, 0.0), high
 
 
+def _log(a: Pair) -> Pair:
+    low, high = _outwards(np.log(a[0]), np.log(a[1]), _LIBRARY)
+    wrong = ~(a[0] > 0.0)
+    return np.where(wrong, -np.inf, low), np.where(wrong, np.inf, high)
+
+
+def _asin(a: Pair) -> Pair:
+    return _of_cosine(a, *_outwards(np.arcsin(a[0]), np.arcsin(a[1]), _LIBRARY))
+
+
+def _acos(a: Pair) -> Pair:
+    return _of_cosine(a, *_outwards(np.arccos(a[1]), np.arccos(a[0]), _LIBRARY))
+
+
+def _of_cosine(a: Pair, low: Array, high: Array) -> Pair:
+    wrong = ~((a[0] >= -1.0) & (a[1] <= 1.0))
+    return np.where(wrong, -np.inf, low), np.where(wrong, np.inf, high)
+
+
+def _atan(a: Pair) -> Pair:
+    return _outwards(np.arctan(a[0]), np.arctan(a[1]), _LIBRARY)
+
+
+def _atan2(a: Pair, b: Pair) -> Pair:
+    """The whole circle where a box holds the origin or a point of the cut; else the angles of its corners."""
+    corners = [np.arctan2(y, x) for y in a for x in b]
+    low, high = _outwards(np.minimum.reduce(corners), np.maximum.reduce(corners), _LIBRARY)
+    whole = ~((b[0] > 0.0) | (a[0] > 0.0) | (a[1] < 0.0))
+    return np.where(whole, np.nextafter(-np.pi, -4.0), low), np.where(whole, np.nextafter(np.pi, 4.0), high)
+
+
 def _sin(a: Pair) -> Pair:
     first, second = np.sin(a[0]), np.sin(a[1])
     low, high = _outwards(np.minimum(first, second), np.maximum(first, second), _LIBRARY)
@@ -208,6 +239,11 @@ _OPERATORS: dict[str, Callable[..., Pair]] = {
     "sin": _sin,
     "cos": _cos,
     "exp": _exp,
+    "log": _log,
+    "asin": _asin,
+    "acos": _acos,
+    "atan": _atan,
+    "atan2": _atan2,
     "abs": _size,
     "min": lambda a, b: (np.minimum(a[0], b[0]), np.minimum(a[1], b[1])),
     "max": lambda a, b: (np.maximum(a[0], b[0]), np.maximum(a[1], b[1])),

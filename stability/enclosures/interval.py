@@ -124,6 +124,53 @@ class Interval:
         """The range of the cosine."""
         return (self + Interval(_down(math.pi / 2), _up(math.pi / 2))).sin()
 
+    def log(self) -> Interval:
+        """The range of the natural logarithm.
+
+        Raises:
+            ValueError: the interval holds numbers that are not positive.
+        """
+        if not self.low > 0.0:
+            raise ValueError(f"logarithm of an interval that is not above 0: {self}; narrow the box")
+        return Interval(*_libm(math.log(self.low), math.log(self.high)))
+
+    def asin(self) -> Interval:
+        """The range of the arc sine.
+
+        Raises:
+            ValueError: the interval leaves [-1, 1].
+        """
+        self._inside("sine")
+        return Interval(*_libm(math.asin(self.low), math.asin(self.high)))
+
+    def acos(self) -> Interval:
+        """The range of the arc cosine.
+
+        Raises:
+            ValueError: the interval leaves [-1, 1].
+        """
+        self._inside("cosine")
+        low, high = _libm(math.acos(self.high), math.acos(self.low))
+        return Interval(max(0.0, low), high)
+
+    def _inside(self, name: str) -> None:
+        if not -1.0 <= self.low <= self.high <= 1.0:
+            raise ValueError(f"arc {name} of an interval that leaves [-1, 1]: {self}; narrow the box")
+
+    def atan(self) -> Interval:
+        """The range of the arc tangent."""
+        return Interval(*_libm(math.atan(self.low), math.atan(self.high)))
+
+    def atan2(self, other: Interval) -> Interval:
+        """The range of the angle of the points (x, y), y in this interval and x in the other.
+
+        The whole circle where the box holds the origin or a point of the cut y = 0, x < 0.
+        """
+        if other.low <= 0.0 and self.low <= 0.0 <= self.high:
+            return Interval(*_libm(-math.pi, math.pi))
+        angles = [math.atan2(y, x) for y in (self.low, self.high) for x in (other.low, other.high)]
+        return Interval(*_libm(min(angles), max(angles)))
+
     def abs(self) -> Interval:
         """The range of the absolute value."""
         small = 0.0 if self.low <= 0.0 <= self.high else min(abs(self.low), abs(self.high))

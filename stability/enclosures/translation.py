@@ -10,8 +10,8 @@ from .expression import BOUNDED, Expression
 
 #: Further CasADi operations: programs may hold them, the prover does not bound them.
 _UNBOUNDED = (
-    "lt", "le", "eq", "ne", "not", "and", "or", "if_else_zero", "sign", "copysign", "floor", "ceil", "log", "pow",
-    "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh",
+    "lt", "le", "eq", "ne", "not", "and", "or", "if_else_zero", "sign", "copysign", "floor", "ceil", "pow",
+    "tan", "sinh", "cosh",
 )  # fmt: skip
 
 
@@ -177,6 +177,11 @@ def _casadi_operators(ca: Any) -> dict[int, Callable[..., int]]:
         ca.OP_SIN: lambda b, i: b.add("sin", i),
         ca.OP_COS: lambda b, i: b.add("cos", i),
         ca.OP_EXP: lambda b, i: b.add("exp", i),
+        ca.OP_LOG: lambda b, i: b.add("log", i),
+        ca.OP_ASIN: lambda b, i: b.add("asin", i),
+        ca.OP_ACOS: lambda b, i: b.add("acos", i),
+        ca.OP_ATAN: lambda b, i: b.add("atan", i),
+        ca.OP_ATAN2: lambda b, i, j: b.add("atan2", i, j),
         ca.OP_FABS: lambda b, i: b.add("abs", i),
         ca.OP_FMIN: lambda b, i, j: b.add("min", i, j),
         ca.OP_FMAX: lambda b, i, j: b.add("max", i, j),

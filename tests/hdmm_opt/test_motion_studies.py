@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio
 import pytest
 from click.testing import CliRunner
-from test_crane_dynamics import LIFT, TILT, Closed, closing
+from test_crane_dynamics import Closed
 
 from hdmm_opt.cli import main
 from hdmm_opt.errors import InvalidInputError
@@ -130,7 +130,12 @@ class Motion:
         frame = pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
         tool = closed.data.oMi[telescope].translation.copy()
         moved = pinocchio.getVelocity(closed.model, closed.data, telescope, frame).linear
-        return force, rate[[closed.column(n) for n in ("lift_rod", "tilt_rod", "telescope")]], tool, np.hypot(*moved[[0, 2]])
+        return (
+            force,
+            rate[[closed.column(n) for n in ("lift_rod", "tilt_rod", "telescope")]],
+            tool,
+            np.hypot(*moved[[0, 2]]),
+        )
 
     def inside(self, *, speed=SPEED, acceleration=ACCELERATION, jerk=JERK, current=None):
         """Whether every limit of the crane holds on every point."""

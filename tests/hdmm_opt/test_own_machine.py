@@ -252,3 +252,27 @@ def test_a_wrong_study_is_one_line_that_names_file_and_key(name, tmp_path):
 def test_a_byte_order_mark_does_no_harm(tmp_path):
     (tmp_path / "mine.toml").write_text(README[1], encoding="utf-8-sig")
     assert study.load(str(tmp_path / "mine.toml")).study.name == "mine"
+
+
+def test_all_that_is_wrong_with_the_numbers_is_said_at_once(tmp_path):
+    """One line for each, so that the next run is not the next refusal."""
+    from click.testing import CliRunner
+
+    from hdmm_opt.cli import main
+
+    text = README[1]
+    for old, new in (
+        ('screw_lead = { value = 0.005, unit = "m"', 'screw_lead = { value = 5, unit = "mm"'),
+        ("gear_ratio = ", "gear_ration = "),
+        ("torque = { value = 38.0", "force = { value = 38.0"),
+        ("tracking_error_m = ", "tracking_error_mm = "),
+    ):
+        assert old in text
+        text = text.replace(old, new, 1)
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    done = CliRunner().invoke(main, ["design", str(tmp_path / "mine.toml")])
+    said = done.stderr if hasattr(done, "stderr") else done.output
+    lines = said.splitlines()
+    assert done.exit_code == 2 and len(lines) == 4 and all("mine.toml" in line and ";" in line for line in lines)
+    for word in ("screw_lead.unit", "gear_ration", "limits.force", "tracking_error_mm"):
+        assert sum(word in line for line in lines) == 1, said

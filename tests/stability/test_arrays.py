@@ -15,6 +15,8 @@ FORMULAS = {
     "quotient": (X[0] - X[1]) / (X[2] ** 2 + 0.5),
     "root": ca.sqrt(X[0] ** 2 + X[1] ** 2 + 1e-3) * ca.tanh(X[2]),
     "exponential": ca.exp(-X[0]) + ca.fabs(X[1]),
+    "angles": ca.atan2(X[0], X[1]) + ca.atan(X[2]),
+    "inverses": ca.asin(ca.tanh(X[0])) - ca.acos(ca.cos(X[1])) + ca.log(ca.exp(X[2]) + 0.1),
     "extremes": ca.fmin(X[0], X[1]) - ca.fmax(X[1], X[2]),
 }
 NAMES = ("x", "y", "z")
@@ -40,7 +42,9 @@ def test_it_holds_the_values_and_is_as_tight_as_one_box_at_a_time(formula, boxes
 
 def test_what_cannot_be_told_is_infinite():
     x = ca.SX.sym("x")
-    for formula, box in ((1 / x, (-1.0, 1.0)), (ca.sqrt(x), (-1.0, 1.0)), (1 / x - 2 / x, (0.0, 1.0))):
+    for formula, box in ((1 / x, (-1.0, 1.0)), (ca.sqrt(x), (-1.0, 1.0)), (1 / x - 2 / x, (0.0, 1.0)),
+        (ca.log(x), (0.0, 1.0)), (ca.asin(x), (0.5, 1.5)), (ca.acos(x), (-2.0, 0.0)),
+    ):  # fmt: skip
         lower, upper = enclose_many(
             from_casadi(ca.Function("f", [x], [formula]), ("x",)), {"x": tuple(np.array([end]) for end in box)}
         )

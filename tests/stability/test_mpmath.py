@@ -12,7 +12,8 @@ from stability import Interval, checker
 mpmath.mp.dps = 60
 ONE_ARGUMENT = {
     "tanh": (mpmath.tanh, -30.0, 30.0), "sqrt": (mpmath.sqrt, 0.0, 1e6), "sin": (mpmath.sin, -50.0, 50.0),
-    "cos": (mpmath.cos, -50.0, 50.0), "exp": (mpmath.exp, -50.0, 50.0),
+    "cos": (mpmath.cos, -50.0, 50.0), "exp": (mpmath.exp, -50.0, 50.0), "log": (mpmath.log, 1e-6, 1e6),
+    "asin": (mpmath.asin, -1.0, 1.0), "acos": (mpmath.acos, -1.0, 1.0), "atan": (mpmath.atan, -1e3, 1e3),
 }  # fmt: skip
 
 
@@ -35,7 +36,7 @@ def missed(seed, count):
     random_, wrong = random.Random(seed), 0
     checker.WORK.begin(10**9)
     for _ in range(count):
-        name = random_.choice((*ONE_ARGUMENT, "mul", "div", "exponential"))
+        name = random_.choice((*ONE_ARGUMENT, "mul", "div", "atan2", "exponential"))
         if name in ONE_ARGUMENT:
             function, low, high = ONE_ARGUMENT[name]
             (a, b), x = drawn(random_, low, high)
@@ -44,6 +45,11 @@ def missed(seed, count):
             wrong += not mpmath.mpf(found.low) <= value <= mpmath.mpf(found.high)
             bounds = own(name, Fraction(a), Fraction(b))
             wrong += bounds is not None and not exact(bounds[0]) <= value <= exact(bounds[1])
+        elif name == "atan2":
+            (a, b), y = drawn(random_, -1e3, 1e3)
+            (c, d), x = drawn(random_, -1e3, 1e3)
+            found = Interval(a, b).atan2(Interval(c, d))
+            wrong += not mpmath.mpf(found.low) <= mpmath.atan2(mpmath.mpf(y), mpmath.mpf(x)) <= mpmath.mpf(found.high)
         elif name == "exponential":
             x = Fraction(random_.uniform(-60, 60))
             low, high = checker.exponential(x)
