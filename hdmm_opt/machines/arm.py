@@ -16,7 +16,7 @@ from ..names import nearest
 from ..plants import EFFECTIVENESS, Limit, Plant, effectiveness
 from ..plants.rigid_joint import UNITS, joint_parameters, rigid_joint
 from .machine import Disturbance, Machine
-from .model import STROKE, Model, no_place, stroke_of
+from .model import EACH, STROKE, Model, no_place, stroke_of
 from .rigid_body import Payload, inverse_dynamics, pose
 from .urdf import Body, bodies
 
@@ -160,4 +160,7 @@ def _build(section: Any) -> Machine:
     return arm(_urdf(section.urdf), section.joints, damping, section.tip_m or (0.0, 0.0, 0.0))
 
 
-MODEL = Model(members=lambda section: tuple(section.joints), check=_check, build=_build, kinds=("quintic",))
+MODEL = Model(
+    members=lambda section: tuple(section.joints), check=_check, build=_build, kinds=("quintic", "bspline"),
+    limited=EACH,
+)  # fmt: skip

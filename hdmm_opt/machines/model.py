@@ -11,6 +11,9 @@ from ..names import nearest
 from ..plants import EFFECTIVENESS, Parameter, Plant, effectiveness
 from .machine import Machine
 
+#: Limits of the reference of one actuator, which are required, and of an arm, with an entry for each joint.
+SINGLE, EACH = ("speed_m_s", "acceleration_m_s2", "jerk_m_s3"), ("speed", "acceleration", "jerk")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Model:
@@ -21,12 +24,14 @@ class Model:
         check: Section -> the keys that do not fit.
         build: Section -> the machine.
         kinds: Kinds of reference that it can follow.
+        limited: Limits of the reference that a study can give, by their keys.
     """
 
     members: Callable[[Any], tuple[str, ...]]
     check: Callable[[Any], Iterator[RefusedKeyError]]
     build: Callable[[Any], Machine]
     kinds: tuple[str, ...]
+    limited: tuple[str, ...] = ()
 
 
 def given(parameters: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Parameter]:

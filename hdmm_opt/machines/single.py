@@ -12,7 +12,7 @@ from ..names import nearest
 from ..plants import EFFECTIVENESS
 from ..plants.registry import PlantModel
 from .machine import Disturbance, Machine
-from .model import Model, Numbers, check_numbers, check_parameters, given, no_place, numbers_of
+from .model import SINGLE, Model, Numbers, check_numbers, check_parameters, given, no_place, numbers_of
 
 #: Name of the only member.
 MEMBER = "actuator"
@@ -58,4 +58,7 @@ def single(name: str, plant: PlantModel) -> Model:
             place=ca.Function("place", [x], [x]), planner="axis", bundled={MEMBER: numbers.left(made, coupled=False)},
         )  # fmt: skip
 
-    return Model(members=lambda section: (MEMBER,), check=check, build=build, kinds=("quintic", "bspline"))
+    return Model(
+        members=lambda section: (MEMBER,), check=check, build=build, kinds=("quintic", "bspline"),
+        limited=(*SINGLE, "torque_nm", "current_a", "voltage_v"),
+    )  # fmt: skip

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from trajectories import Reference, Spline, constant, quintic
+import numpy as np
+
+from trajectories import LimitViolatedError, Reference, Spline, constant, quintic, violations
 
 from ..errors import InvalidInputError
 from ..machines.machine import Machine
 from ..study import Study
+from .arm_mover import arm_mover
 from .crane_moves import crane_moves
+from .job import Job, Move
+from .mover import Bounded, Mover
+from .sequence import carried_out
 from .single_axis import axis_moves
 
 #: From a study and its machine to the moves, each a spline of every member that starts at time 0.
@@ -17,12 +23,44 @@ Planner = Callable[[Study, Machine], list[list[Spline]]]
 
 
 def joint_moves(study: Study, machine: Machine) -> list[list[Spline]]:
-    """Quintic moves of all joints from waypoint to waypoint in the given times."""
+    """Moves of all joints from waypoint to waypoint: quintic in the given times, or of least time by the program.
+
+    Raises:
+        InvalidInputError: a move that is outside the study's limits, or that cannot be reached inside them.
+    """
     section = study.reference
-    return [
+    mover, limits = arm_mover(machine), section.limits
+    bounds = Bounded() if limits is None else Bounded(
+        speed=limits.speed, acceleration=limits.acceleration, jerk=limits.jerk
+    )  # fmt: skip
+    if section.kind == "bspline":
+        return _least_time(study, mover, bounds)
+    moves = [
         [quintic(a, b, 0.0, duration) for a, b in zip(start, goal, strict=True)]
         for start, goal, duration in zip(section.waypoints, section.waypoints[1:], section.durations_s, strict=False)
     ]
+    for k, move in enumerate(moves, 1):
+        together = Spline(knots=move[0].knots, coefficients=np.stack([s.coefficients for s in move], axis=1))
+        broken = violations(together, bounds.of(mover.limits))
+        if broken:
+            raise InvalidInputError(f"reference: move {k}: {broken[0]}; allow more time, or widen the limit")
+    return moves
+
+
+def _least_time(study: Study, mover: Mover, bounds: Bounded) -> list[list[Spline]]:
+    """Minimum-time moves of an arm with a weight on jerk, at the largest payload."""
+    section, payload = study.reference, max(study.uncertainty.disturbances["payload"].range)
+    job = Job(
+        mover=mover, start=section.waypoints[0], longest=section.longest_s, bounds=bounds,
+        moves=tuple(Move(joints=place, payload=payload) for place in section.waypoints[1:]),
+    )  # fmt: skip
+    try:
+        found = carried_out(
+            job, lambda mass: mover.cost(payload=mass, jerk=section.jerk_weight), "reference", spans=section.spans
+        )
+    except LimitViolatedError as error:
+        raise InvalidInputError(f"reference: {error}") from None
+    return [[motion.spline.coordinate(k) for k in range(len(mover.names))] for motion in found.motions]
 
 
 #: Planners by the name that a machine gives.

@@ -10,13 +10,19 @@ from pydantic import Field, model_validator
 from .messages import refused
 from .sections import NonNegative, Places, Positive, Section
 
+#: An entry for each member.
+Sizes = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=16)]
+
 
 class MotionLimitSection(Section):
-    """Limits of the reference of one member."""
+    """Limits of the reference: of one actuator with units in the keys, of an arm with an entry for each joint."""
 
-    speed_m_s: Positive
-    acceleration_m_s2: Positive
-    jerk_m_s3: Positive
+    speed_m_s: Positive | None = None
+    acceleration_m_s2: Positive | None = None
+    jerk_m_s3: Positive | None = None
+    speed: Sizes | None = None
+    acceleration: Sizes | None = None
+    jerk: Sizes | None = None
     torque_nm: Positive | None = None
     current_a: Positive | None = None
     voltage_v: Positive | None = None

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pydantic import model_validator
 
 from ..errors import RefusedKeyError
+from ..machines.model import SINGLE
 from ..machines.registry import model
 from ..names import nearest
 from .controller import ControllerSection, TuningSection
@@ -37,7 +38,7 @@ class Study(Section):
     @model_validator(mode="after")
     def _consistent(self) -> Study:
         check_names(scenario.name for scenario in self.validation.scenarios)
-        refused_together([*self._members(), *self._courses(), *self._kind()])
+        refused_together([*self._members(), *self._courses(), *self._kind(), *self._limits()])
         return self
 
     def _kind(self) -> Iterator[RefusedKeyError]:
@@ -45,6 +46,20 @@ class Study(Section):
         if self.reference.kind not in kinds:
             wanted = " or ".join(f'"{kind}"' for kind in kinds)
             yield RefusedKeyError("reference.kind", f'is {wanted} for model = "{self.plant.model}"', "change it")
+
+    def _limits(self) -> Iterator[RefusedKeyError]:
+        given, known = self.reference.limits, model(self.plant.model).limited
+        needed = SINGLE if SINGLE[0] in known else ()
+        for key in needed if given is not None else ():
+            if getattr(given, key) is None:
+                yield RefusedKeyError(f"reference.limits.{key}", "is required and missing", "add it")
+        for key, value in () if given is None else given:
+            if value is not None and key not in known:
+                rule = f'has no place with model = "{self.plant.model}"'
+                yield RefusedKeyError(f"reference.limits.{key}", rule, nearest(key, known) if known else "remove it")
+            elif isinstance(value, tuple) and len(value) != len(self.members):
+                rule = f"must have one entry for each of {', '.join(self.members)}: got {len(value)}"
+                yield RefusedKeyError(f"reference.limits.{key}", rule, "complete it")
 
     def _members(self) -> Iterator[RefusedKeyError]:
         members = self.members

@@ -58,7 +58,7 @@ def follows(data: dict[str, Any], entry: dict[str, Any], claim: Claim, which: in
             need(lasted <= number(section["longest_s"], "longest_s") * (1 + MET), f"move {k + 1} lasts too long")
     lasted = number(segments[-1]["knots"][-1], "a knot")
     need(claim.transient < lasted, "the transient outlasts the reference")
-    _limited(section, claim, segments)
+    _limited(section, claim, segments, which, count)
 
 
 def _of(segment: dict[str, Any]) -> tuple[list[Fraction], list[Fraction]]:
@@ -83,15 +83,22 @@ def _quintic(knots: list[Fraction], points: list[Fraction]) -> bool:
     return True
 
 
-def _limited(section: dict[str, Any], claim: Claim, segments: list[dict[str, Any]]) -> None:
+def _limited(section: dict[str, Any], claim: Claim, segments: list[dict[str, Any]], which: int, count: int) -> None:
     """The study's limits on speed, acceleration and jerk: by control points, or where these pass them by spans."""
     given = section.get("limits")
     if given is None:
         return
     first = 1 if claim.first == "position" else 0
-    keys = ("speed_m_s", "acceleration_m_s2", "jerk_m_s3")
-    for order, key in enumerate(keys, first):
-        limit = number(given[key], key)
+    single = {"speed_m_s": first, "acceleration_m_s2": first + 1, "jerk_m_s3": first + 2}
+    each = {"speed": 1, "acceleration": 2, "jerk": 3}
+    wrong = sorted(set(given) & set(each if count == 1 else single))
+    need(not wrong, f"reference.limits.{'; '.join(wrong)} has no place in this machine")
+    need(count == 1 or claim.first == "position", "the limits of several members are those of positions")
+    for key, order in (single if count == 1 else each).items():
+        if key not in given:
+            need(count > 1, f"reference.limits.{key} is missing")
+            continue
+        limit = number(given[key], key) if count == 1 else numbers(given[key], count, key)[which]
         need(limit > 0, f"{key} must be positive")
         if not _inside(claim.reference[order], limit):
             kept = all(_inside(piece[order], limit) for segment in segments for piece in _pieces(segment))

@@ -54,9 +54,12 @@ SCENARIO = {
     "bias": plain_number, "initial": plain_number, "quantisation": plain_number, "faults": named(FAULT),
 }  # fmt: skip
 MOTION_LIMITS = entry_of(
-    dict.fromkeys(("speed_m_s", "acceleration_m_s2", "jerk_m_s3"), plain_number),
-    dict.fromkeys(("torque_nm", "current_a", "voltage_v"), plain_number),
-)
+    {},
+    {**dict.fromkeys(("speed_m_s", "acceleration_m_s2", "jerk_m_s3"), plain_number),
+     **dict.fromkeys(("torque_nm", "current_a", "voltage_v"), plain_number),
+     **dict.fromkeys(("speed", "acceleration", "jerk"), listed(plain_number, 1, MAX_MEMBERS))},
+)  # fmt: skip
+
 REQUIREMENTS = (
     "settling_time_s", "peak_torque_nm", "rms_torque_nm", "peak_current_a", "rms_current_a", "peak_voltage_v",
 )  # fmt: skip

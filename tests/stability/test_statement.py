@@ -418,7 +418,18 @@ def half_a_current(d):
     d["members"][0]["model"]["limits"][1]["signals"] = ["i_d"]
 
 
+def limits_of_joints(**limits):
+    def bend(d):
+        d["study"]["reference"]["limits"] = limits
+
+    return bend
+
+
 MACHINES = {
+    "a joint that is faster than its limit": ("arm-p3", limits_of_joints(speed=[1.0, 0.04, 1.0])),
+    "a jerk over its limit": ("arm-p3", limits_of_joints(jerk=[1.0, 1.0, 1e-3])),
+    "limits of two of three joints": ("arm-p3", limits_of_joints(speed=[1.0, 1.0])),
+    "limits of one actuator": ("arm-p3", limits_of_joints(speed_m_s=1.0, acceleration_m_s2=1.0, jerk_m_s3=1.0)),
     "an output that nothing moves": ("arm-p3", no_place), "an output of a hundredth": ("arm-p3", small_place),
     "bodies without weight": ("arm-p3", loads_of_bodies_without_weight),
     "a payload of any course": ("arm-p3", payload_of_any_course), "joints in another order": ("arm-p3", other_order),
@@ -434,6 +445,12 @@ def test_a_false_statement_about_a_machine_is_refused(name):
     bend(document)
     report = judged(document)
     assert report.status in (1, 2) and report.message.isprintable(), report.message
+
+
+def test_limits_of_joints_that_hold_are_accepted():
+    document = json.loads((GAINS / "arm-p3.gains.json").read_text(encoding="utf-8"))
+    limits_of_joints(speed=[1.0, 1.0, 1.0], jerk=[1.0, 1.0, 1.0])(document)
+    assert judged(document).status == 0
 
 
 def test_a_machine_that_is_the_same_for_every_payload_is_refused():
