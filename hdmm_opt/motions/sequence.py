@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,14 +13,16 @@ from numpy.typing import NDArray
 from trajectories import LimitViolatedError, Motion, Waypoint, solve
 
 from ..errors import InvalidInputError
-from .job import Job, Move, State, spans_of
+from .job import Job, Move, Place, State, spans_of
 from .retimed import jerk_limited_motion, retimed_motion
 from .tool_path import along_joints, path_task
 
 Array = NDArray[np.float64]
 
 #: A tool nearer to its goal than this, m, is there; joints nearer than this, rad or m, too.
-NOWHERE = 1e-6
+NOWHERE = 1e-4
+#: Places that follow each other closer than this share of the longest way between two of them make no program.
+CLOSE = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,28 +77,42 @@ def _going_somewhere(job: Job, move: Move, at: State) -> None:
     Raises:
         ValueError: it does.
     """
-    before, here = at.place, job.mover.place(at.place)[: len(job.mover.coordinates)]
-    for number, place in enumerate([*move.via, *([] if move.path else [move])], 1):
-        goal = number > len(move.via)
-        moving = number == 1 and at.speed is not None
+    places = [*move.via, *([] if move.path else [move])]
+    ways = _ways(job, places, at)
+    for number, (place, way) in enumerate(zip(places, ways, strict=True)):
+        key = "" if number == len(move.via) else f"via.{number}: "
+        moving = at.speed is not None and number == 0
+        if way < NOWHERE and not moving and place.angle is None:
+            what = "tool goes from one place to another: it is" if place.joints is None else (
+                "joints go from one place to another: they are"
+            )  # fmt: skip
+            raise ValueError(f"{key}the {what} at {list(place.joints or place.tool or ())} already")
+        if way < CLOSE * max(ways) and not moving and place.angle is None:
+            raise ValueError(
+                f"{key}it is {way:.3g} from the place before, less than {CLOSE:.0%} of the longest way between two "
+                f"places, {max(ways):.3g}: leave one of them out"
+            )
+        for obstacle in job.obstacles if place.tool is not None else ():
+            clear = float(obstacle.clearance(place.tool))
+            if clear < 0:
+                said = job.mover.said(place.tool)
+                raise ValueError(f"the tool keeps clear of {obstacle.name}: {said} is {-clear:.3g} m inside")
+
+
+def _ways(job: Job, places: Sequence[Place], at: State) -> list[float]:
+    """How far each place is from the one before: between joint coordinates where both have them, else of the tool."""
+    joints, tool = at.place, job.mover.place(at.place)[: len(job.mover.coordinates)]
+    found = []
+    for place in places:
         if place.joints is not None:
             there = np.array(place.joints)
-            near, what = float(np.abs(there - before).max()), "joints go from one place to another: they are"
-            before, here = there, job.mover.place(there)[: len(here)]
+            spot = job.mover.place(there)[: len(tool)]
         else:
-            there = np.array(place.tool)
-            near, what = float(np.abs(there - here).max()), "tool goes from one place to another: it is"
-            if place.angle is not None:
-                near = max(near, NOWHERE)  # it may turn where it is
-            before, here = np.full(len(before), np.nan), there
-        if near < NOWHERE and not moving:
-            key = "" if goal else f"via.{number - 1}: "
-            raise ValueError(f"{key}the {what} at {there.tolist()} already")
-        for obstacle in job.obstacles if place.joints is None else ():
-            clear = float(obstacle.clearance(there))
-            if clear < 0:
-                said = job.mover.said(there.tolist())
-                raise ValueError(f"the tool keeps clear of {obstacle.name}: {said} is {-clear:.3g} m inside")
+            there, spot = None, np.array(place.tool)
+        apart = spot - tool if joints is None or there is None else there - joints
+        found.append(float(np.abs(apart).max()))
+        joints, tool = there, spot
+    return found
 
 
 def carried_out(

@@ -71,7 +71,9 @@ class MoveSection(PlaceSection):
             raise refused("tolerances", "has no place beside speed", "remove one of the two")
 
 
-Sizes = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=16)]
+#: No machine is limited to less, in SI units; what is smaller is a mistake in the unit.
+Limit = Annotated[float, Field(ge=1e-4)]
+Sizes = Annotated[tuple[Limit, ...], Field(min_length=1, max_length=16)]
 
 
 class LimitsSection(Section):
@@ -80,13 +82,13 @@ class LimitsSection(Section):
     speed: Sizes | None = None
     acceleration: Sizes | None = None
     jerk: Sizes | None = None
-    rod_force_n: Positive | None = None
-    motor_speed_rad_s: Positive | None = None
-    motor_torque_nm: Positive | None = None
-    current_a: Positive | None = None
-    voltage_v: Positive | None = None
-    tool_speed_m_s: Positive | None = None
-    tool_acceleration_m_s2: Positive | None = None
+    rod_force_n: Limit | None = None
+    motor_speed_rad_s: Limit | None = None
+    motor_torque_nm: Limit | None = None
+    current_a: Limit | None = None
+    voltage_v: Limit | None = None
+    tool_speed_m_s: Limit | None = None
+    tool_acceleration_m_s2: Limit | None = None
 
 
 class ObstacleSection(Section):
@@ -137,7 +139,7 @@ class JobSection(Section):
     start: Joints
     start_speed: Joints | None = None
     start_acceleration: Joints | None = None
-    longest_s: Positive = 60.0
+    longest_s: Annotated[float, Field(ge=0.01)] = 60.0
     spans: Annotated[int, Field(ge=6, le=200)] | None = None
     limits: LimitsSection = LimitsSection()
     cost: CostSection | None = None

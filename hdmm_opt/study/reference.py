@@ -43,7 +43,7 @@ class ReferenceSection(Section):
     pace: Annotated[float, Field(gt=0, le=1)] = 1.0
     jerk_weight: NonNegative = 0.05
     longest_s: Positive = 60.0
-    spans: Annotated[int, Field(ge=6, le=200)] = 24
+    spans: Annotated[int, Field(ge=6, le=200)] = 36
     limits: MotionLimitSection | None = None
 
     @model_validator(mode="after")
