@@ -23,10 +23,13 @@ from scipy.interpolate import BSpline
 from hdmm_opt.motions.enclosure import enclosure
 from hdmm_opt.machines.rigid_body import inverse_dynamics
 from hdmm_opt.machines.urdf import bodies
+from hdmm_opt.motions.crane_task import crane_task
 from trajectories import MotionLimits, Quantities, Task, Waypoint, solve
-from trajectories.guess import straight
+from trajectories.guess import Guess, remaining, straight
+from trajectories import nodes, program
 from trajectories.nodes import collocation_points
 from trajectories.program import derivative_matrices
+from trajectories.solver import solver_of
 from trajectories.spline import Spline, clamped_knots
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
@@ -81,7 +84,19 @@ def violation(given: Case, curve: Callable[[np.ndarray, int], np.ndarray], durat
     return max(0.0, *shares, *(e - 1e-6 for e in ends))
 
 
+def forget() -> None:
+    """Leave nothing of earlier programs."""
+    for kept in (program._built, solver_of, nodes._node):
+        kept.cache_clear()
+
+
 def ours(given: Case) -> tuple[float, Callable, float]:
+    forget()
+    return ours_again(given)
+
+
+def ours_again(given: Case) -> tuple[float, Callable, float]:
+    """With the program that the solve before it left."""
     motion = solve(given.task)
     return motion.cost, motion.spline, motion.spline.end
 
@@ -171,19 +186,19 @@ def drake(given: Case) -> tuple[float, Callable, float]:
     guess = straight(task)
     basis = BsplineBasis(task.degree + 1, clamped_knots(0.0, 1.0, SPANS).tolist())
     start = BsplineTrajectory(basis, [p[:, None] for p in guess.points[0]])
-    program = KinematicTrajectoryOptimization(start)
+    planner = KinematicTrajectoryOptimization(start)
     assert KnotVectorType is not None
-    program.AddDurationCost(1.0)
-    program.AddDurationConstraint(0.01, 60.0)
-    program.AddPositionBounds(np.full(count, -2.8), np.full(count, 2.8))
-    program.AddVelocityBounds(-limits.of(1), limits.of(1))
-    program.AddAccelerationBounds(-limits.of(2), limits.of(2))
-    program.AddJerkBounds(-limits.of(3), limits.of(3))
+    planner.AddDurationCost(1.0)
+    planner.AddDurationConstraint(0.01, 60.0)
+    planner.AddPositionBounds(np.full(count, -2.8), np.full(count, 2.8))
+    planner.AddVelocityBounds(-limits.of(1), limits.of(1))
+    planner.AddAccelerationBounds(-limits.of(2), limits.of(2))
+    planner.AddJerkBounds(-limits.of(3), limits.of(3))
     for s, place in ((0.0, 0), (1.0, 1)):
         value = np.asarray(task.waypoints[place].value)
-        program.AddPathPositionConstraint(value, value, s)
-        program.AddPathVelocityConstraint(np.zeros(count), np.zeros(count), s)
-        program.AddPathAccelerationConstraint(np.zeros(count), np.zeros(count), s)
+        planner.AddPathPositionConstraint(value, value, s)
+        planner.AddPathVelocityConstraint(np.zeros(count), np.zeros(count), s)
+        planner.AddPathAccelerationConstraint(np.zeros(count), np.zeros(count), s)
     plant = MultibodyPlant(0.0)
     models = Parser(plant).AddModelsFromString(given.urdf, "urdf")
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("l0", models[0]))
@@ -194,14 +209,14 @@ def drake(given: Case) -> tuple[float, Callable, float]:
             plant.AddJointActuator(f"j{k + 1}", plant.GetJointByName(f"j{k + 1}"), float(given.limit[k]))
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -9.80665])
     plant.Finalize()
-    program.AddEffortBoundsAtNormalizedTimes(plant, collocation_points(SPANS)[0], -given.limit, given.limit)
-    program.SetInitialGuess(start)
-    prog = program.get_mutable_prog()
-    prog.SetInitialGuess(program.duration(), float(guess.durations[0]))
+    planner.AddEffortBoundsAtNormalizedTimes(plant, collocation_points(SPANS)[0], -given.limit, given.limit)
+    planner.SetInitialGuess(start)
+    prog = planner.get_mutable_prog()
+    prog.SetInitialGuess(planner.duration(), float(guess.durations[0]))
     answer = IpoptSolver().Solve(prog)
     if not answer.is_success():
         raise RuntimeError(f"Drake: {answer.get_solution_result()}")
-    found = program.ReconstructTrajectory(answer)
+    found = planner.ReconstructTrajectory(answer)
     t = found.end_time()
     coefficients = np.array([np.asarray(p).ravel() for p in found.control_points()])
     spline = BSpline(t * clamped_knots(0.0, 1.0, SPANS), coefficients, task.degree)
@@ -217,18 +232,45 @@ def fastest(action: Callable, given: Case, repeats: int = 3) -> tuple[float, tup
     return min(times), result
 
 
+def replanned(spans: int) -> None:
+    """A motion of the crane: the first solve of a process, another goal, and a start on the way."""
+    start, goal = [0.2, -1.2, 0.2], [0.9, -0.8, 0.6]
+    forget()
+    solved = {}
+
+    def timed(name: str, task: Task, guess: Guess | None = None) -> None:
+        begun = time.perf_counter()
+        motion = solve(task, guess=guess)
+        solved[name] = (time.perf_counter() - begun, motion.iterations, motion)
+
+    timed("first solve", crane_task([start, goal], payload=20.0, spans=spans))
+    first = solved["first solve"][2].spline
+    timed("the same again", crane_task([start, goal], payload=20.0, spans=spans))
+    timed("another goal", crane_task([start, [0.88, -0.8, 0.6]], payload=20.0, spans=spans))
+    here = Waypoint(value=first([1.0])[0], speed=first([1.0], 1)[0], acceleration=first([1.0], 2)[0])
+    moving = crane_task([here, [0.88, -0.8, 0.6]], payload=20.0, spans=spans)
+    timed("from the way, first", moving)
+    timed("from the way, near", moving, remaining(moving, first, np.array([1.0, first.end])))
+    print(f"\ncrane, {spans} spans\n{'program':22}{'seconds':>10}{'to first':>10}{'iterations':>12}{'time [s]':>10}")
+    for name, (seconds, iterations, motion) in solved.items():
+        share = seconds / solved["first solve"][0]
+        print(f"{name:22}{seconds:10.3f}{share:10.2f}{iterations:12}{motion.spline.end:10.4f}")
+
+
 def main() -> None:
     cases = [
         case(3, np.array([2.0, 18.0, 0.6]), np.array([0.0, 0.5, -0.8]), np.array([1.5, -0.6, 0.9])),
         case(7, np.array([6.0, 55.0, 10.0, 15.0, 1.0, 4.5, 0.1]), np.array([0.0, 0.6, 0.2, -0.9, 0.4, 0.7, 0.0]),
              np.array([1.4, -0.5, -0.6, 0.8, -0.7, -0.4, 1.0])),
     ]  # fmt: skip
-    rivals = {"ours": ours, "Opti": opti, "rockit": rockit, "Drake": drake}
+    rivals = {"ours": ours, "ours again": ours_again, "Opti": opti, "rockit": rockit, "Drake": drake}
     missing = [
         name
         for name, module in (("rockit", "rockit"), ("Drake", "pydrake"))
         if importlib.util.find_spec(module) is None
     ]
+    for spans in (24, 36):
+        replanned(spans)
     for given in cases:
         print(
             f"\n{given.name}\n{'program':10}{'seconds':>10}{'to ours':>10}{'cost [s]':>12}{'to best':>10}{'violation':>12}"

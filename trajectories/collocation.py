@@ -15,7 +15,7 @@ from .limits import LimitViolatedError, violations
 from .nodes import POINTS, TIGHTENING, gauss
 from .program import Program, build
 from .quantity import Peaks, Quantities, peaks
-from .solver import AGAIN, FLOOR, HURRY, NEAR, assembled, bounds, solver_of
+from .solver import AGAIN, ELSEWHERE, FLOOR, HURRY, NEAR, assembled, bounds, solver_of
 from .spline import Spline, clamped_knots
 from .task import Cost, Task, Waypoint
 
@@ -41,7 +41,7 @@ AT_THE_END, FAR_LONGER = 0.9, 1.2
 #: CPU time for finding out why there is no motion, s.
 PATIENCE = 8.0
 #: No other start is tried once the solver has taken so many iterations.
-ITERATIONS = 300
+ITERATIONS = 250
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +116,7 @@ def _elsewhere(task: Task, starts: tuple[Guess, ...], iterations: int) -> Motion
     for start in starts:
         if iterations > ITERATIONS:
             return None
-        attempt = _Attempt(task, start)
+        attempt = _Attempt(task, start, options=ELSEWHERE)
         motion = attempt.run()
         if motion is not None:
             return motion
@@ -194,8 +194,11 @@ def _reject_rates(task: Task, which: str, waypoint: Waypoint) -> None:
 class _Attempt:
     """One search from one guess, with a clock in the CPU time that is left."""
 
-    def __init__(self, task: Task, start: Guess, clock: _Clock | None = None) -> None:
+    def __init__(
+        self, task: Task, start: Guess, clock: _Clock | None = None, options: tuple[tuple[str, Any], ...] = ()
+    ) -> None:
         self.task, self.start, self.clock = task, start, clock
+        self.options = options if clock is None else HURRY
         self.iterations = 0
         self.failure = ""
         self.share = 0.0  # of the longest admitted duration, where the last search ended
@@ -217,8 +220,7 @@ class _Attempt:
         task = self.task
         size = _first_cost(task, start)
         program, scale = build(task), 1.0 / size if size > 0 else 1.0
-        hurry = () if self.clock is None else HURRY
-        solver = solver_of(program, (*hurry, *(NEAR if start.near else ())))
+        solver = solver_of(program, (*self.options, *(NEAR if start.near else ())))
         x = program.shape.packed(list(start.points), start.durations)
         lower, upper = program.rows(task)
         known: dict[str, Any] = {}
@@ -244,7 +246,7 @@ class _Attempt:
             if found is None or found.inside:
                 return None, False
             _tighten(task, program, found, lower, upper)
-            solver = solver_of(program, (*hurry, *AGAIN))
+            solver = solver_of(program, (*self.options, *AGAIN))
             known = {"lam_x0": answer["lam_x"], "lam_g0": answer["lam_g"]}
         return None, False
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -92,7 +93,7 @@ def _profiles(start: Array, goal: Array, limits: MotionLimits, rates: list[Array
     return trajectory.profiles[0], float(trajectory.duration)
 
 
-def _cubic(times: Array, edges: Array, jerks: Array, start: list[float]) -> Array:
+def _cubic(times: Array, edges: Array, jerks: Array, start: Sequence[float]) -> Array:
     """Control points of the cubic spline with a given piecewise constant jerk, from position, speed, acceleration."""
     middle = (times[:-1] + times[1:]) / 2
     jerk = jerks[np.clip(np.searchsorted(edges, middle, side="right") - 1, 0, len(jerks) - 1)]

@@ -25,6 +25,8 @@ _IPOPT = {
 
 #: Least duration of a phase, as a share of the guess.
 FLOOR = 0.02
+#: Further options where another start has failed before.
+ELSEWHERE = (("max_iter", 100),)
 #: Further options where the answer is worth no more than so much CPU time, s.
 HURRY = (("max_cpu_time", 4.0),)
 #: Further options where the search starts close to a solution.

@@ -67,9 +67,9 @@ class Waypoint:
         return self.speed is not None
 
     @property
-    def asked(self) -> Array:
+    def asked(self) -> NDArray[np.int64]:
         """Indices of the entries of `value` that are given."""
-        return np.flatnonzero(np.isfinite(np.asarray(self.value, dtype=float)))
+        return np.flatnonzero(np.isfinite(np.asarray(self.value, dtype=float))).astype(np.int64)
 
     @property
     def ends(self) -> tuple[Array, Array]:

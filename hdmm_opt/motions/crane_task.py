@@ -32,9 +32,10 @@ def crane_mover(least_lever: float = LEAST_LEVER) -> Mover:
     Args:
         least_lever: Shortest admissible lever arm of the actuators of lift and tilt, m/rad.
     """
-    w = ca.SX.sym("w", 3)
+    w: Any = ca.SX.sym("w", 3)
+    across, up = tool(w)
     return Mover(
-        limits=joint_limits(least_lever), pose=ca.Function("pose", [w], [ca.vertcat(*tool(w), w[0] + w[1])]),
+        limits=joint_limits(least_lever), pose=ca.Function("pose", [w], [ca.vertcat(across, up, w[0] + w[1])]),
         coordinates=("x", "z"), turned=True, drives=_drives, costs=running_costs, cost_names=COSTS, assumed=ASSUMED,
     )  # fmt: skip
 

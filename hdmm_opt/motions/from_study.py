@@ -51,7 +51,7 @@ def _place(section: PlaceSection) -> dict[str, Any]:
 
 def _move(section: MoveSection) -> Move:
     return Move(
-        **_place(section), via=tuple(Place(**_place(place)) for place in section.via), path=section.path_m,
+        **_place(section), via=tuple(Place(**_place(place)) for place in section.via), path=section.path_m or (),
         speed=section.speed, payload=section.payload_kg,
     )  # fmt: skip
 

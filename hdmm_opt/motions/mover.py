@@ -200,10 +200,10 @@ class Mover:
             return np.array(evaluate(w)[1])[asked]
 
         inside = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-        found = least_squares(off, inside, slope, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
+        found = least_squares(off, inside, slope, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)  # pyright: ignore[reportArgumentType]
         return found.x if np.abs(found.fun).max() < CLOSE else None
 
-    def said(self, value: Sequence[float]) -> str:
+    def said(self, value: Sequence[float] | Array) -> str:
         """A place of the tool in words."""
         count = len(self.coordinates)
         text = f"({', '.join(f'{x:g}' for x in value[:count])}) m"

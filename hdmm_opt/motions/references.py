@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trajectories import LimitViolatedError, Reference, Spline, constant, quintic, violations
+from trajectories import LimitViolatedError, MotionLimits, Reference, Spline, constant, quintic, violations
 
 from ..errors import InvalidInputError
 from ..machines.machine import Machine
 from ..study import Study
+from ..study.reference import MotionLimitSection
 from .arm_mover import arm_mover
 from .crane_moves import crane_moves
 from .job import Job, Move
@@ -28,20 +29,19 @@ def joint_moves(study: Study, machine: Machine) -> list[list[Spline]]:
     Raises:
         InvalidInputError: a move that is outside the study's limits, or that cannot be reached inside them.
     """
-    section = study.reference
-    mover, limits = arm_mover(machine), section.limits
-    bounds = Bounded() if limits is None else Bounded(
-        speed=limits.speed, acceleration=limits.acceleration, jerk=limits.jerk
-    )  # fmt: skip
+    section, limits = study.reference, study.reference.limits or MotionLimitSection()
+    bounds = Bounded(speed=limits.speed, acceleration=limits.acceleration, jerk=limits.jerk)
     if section.kind == "bspline":
-        return _least_time(study, mover, bounds)
+        return _least_time(study, arm_mover(machine), bounds)
     moves = [
         [quintic(a, b, 0.0, duration) for a, b in zip(start, goal, strict=True)]
         for start, goal, duration in zip(section.waypoints, section.waypoints[1:], section.durations_s, strict=False)
     ]
+    units = tuple(plant.state_units[0] for plant in machine.plants)
+    free = MotionLimits(position=(-np.inf, np.inf), names=machine.members, units=units)
     for k, move in enumerate(moves, 1):
         together = Spline(knots=move[0].knots, coefficients=np.stack([s.coefficients for s in move], axis=1))
-        broken = violations(together, bounds.of(mover.limits))
+        broken = violations(together, bounds.of(free))
         if broken:
             raise InvalidInputError(f"reference: move {k}: {broken[0]}; allow more time, or widen the limit")
     return moves

@@ -92,7 +92,9 @@ def _going_somewhere(job: Job, move: Move, at: State) -> None:
                 f"{key}it is {way:.3g} from the place before, less than {CLOSE:.0%} of the longest way between two "
                 f"places, {max(ways):.3g}: leave one of them out"
             )
-        for obstacle in job.obstacles if place.tool is not None else ():
+        for obstacle in job.obstacles:
+            if place.tool is None:
+                continue
             clear = float(obstacle.clearance(place.tool))
             if clear < 0:
                 said = job.mover.said(place.tool)

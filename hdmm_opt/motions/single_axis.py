@@ -115,13 +115,11 @@ def _limits(limits: MotionLimitSection, plant: Plant) -> MotionLimits:
     """The study's limits as those of the first state and its derivatives."""
     low, high = plant.stroke
     units = (plant.state_units[0],)
+    speed, acceleration, jerk = limits.single
     if plant.first == "position":
-        return MotionLimits(
-            position=(low, high), speed=limits.speed_m_s, acceleration=limits.acceleration_m_s2,
-            jerk=limits.jerk_m_s3, units=units,
-        )  # fmt: skip
-    inside = max(low, -limits.speed_m_s), min(high, limits.speed_m_s)
-    return MotionLimits(position=inside, speed=limits.acceleration_m_s2, acceleration=limits.jerk_m_s3, units=units)
+        return MotionLimits(position=(low, high), speed=speed, acceleration=acceleration, jerk=jerk, units=units)
+    inside = max(low, -speed), min(high, speed)
+    return MotionLimits(position=inside, speed=acceleration, acceleration=jerk, units=units)
 
 
 def _efforts(study: Study, limits: MotionLimitSection, plant: Plant) -> tuple[Quantities | None, Any]:
@@ -153,7 +151,7 @@ def effort_table(study: Study, plant: Plant, reference: Reference) -> list[dict[
     assert limits is not None
     rows: list[dict[str, float | str | None]] = []
     bounds, units = reference.bounds(), plant.reference_units
-    known = {"speed": limits.speed_m_s, "acceleration": limits.acceleration_m_s2, "jerk": limits.jerk_m_s3}
+    known = dict(zip(("speed", "acceleration", "jerk"), limits.single, strict=True))
     for order, (name, limit) in enumerate(known.items(), 1 if plant.first == "position" else 0):
         rows.append({"quantity": name, "unit": units[order], "peak": max(map(abs, bounds[order])), "limit": limit})
     if plant.efforts is None:

@@ -78,7 +78,7 @@ def _path(job: Job, move: Move, at: State) -> Path:
     """Place of the tool, and its angle where the move gives one, over the path coordinate."""
     here, count = job.mover.place(at.place), len(job.mover.coordinates)
     s = ca.SX.sym("s")
-    value = curve([here[:count], *move.path]).function(s)
+    value = curve(np.array([here[:count], *move.path])).function(s)
     if move.angle is not None:
         value = ca.vertcat(value, here[count] + s * (move.angle - here[count]))
     return Path(function=ca.Function("path", [s], [value]))
@@ -104,16 +104,17 @@ def _quantities(job: Job, move: Move, path: Path) -> Quantities:
     given, count = job.quantities(move.payload), len(job.mover.coordinates)
     curves = [ca.SX.sym(name, len(job.start) + 1) for name in "xvaj"]
     pose, wanted = job.mover.pose(curves[0][:-1]), path.function(curves[0][-1])
-    # as the clearance of a ball: a distance near the tolerance, and smooth on the path
-    off = [(ca.sumsqr(pose[:count] - wanted[:count]), move.tolerance, "room to the tolerance", "m")]
+    # half of 1 less the squared share: near the tolerance the share of it that is left, and smooth on the path
+    off = [(ca.sumsqr(pose[:count] - wanted[:count]) / move.tolerance**2, "share of the tolerance that is left")]
     if move.angle is not None:
-        off.append(((pose[count] - wanted[count]) ** 2, move.angle_tolerance, "room to the angle's tolerance", "rad"))
-    rooms = [(room**2 - square) / (2 * room) for square, room, _, _ in off]
+        share = (pose[count] - wanted[count]) ** 2 / move.angle_tolerance**2
+        off.append((share, "share of the angle's tolerance that is left"))
+    rooms = [(1 - square) / 2 for square, _ in off]
     function = ca.Function("path", curves, [ca.densify(ca.vertcat(given.function(*(c[:-1] for c in curves)), *rooms))])
     return Quantities(
         function=function,
-        names=(*given.names, *(name for _, _, name, _ in off)),
-        units=(*given.units, *(unit for _, _, _, unit in off)),
+        names=(*given.names, *(name for _, name in off)),
+        units=(*given.units, *("1" for _ in off)),
         lower=np.append(given.lower, np.zeros(len(off))),
         upper=np.append(given.upper, np.full(len(off), np.inf)),
         enclose=enclosure(function),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -26,6 +27,14 @@ class MotionLimitSection(Section):
     torque_nm: Positive | None = None
     current_a: Positive | None = None
     voltage_v: Positive | None = None
+
+    @property
+    def single(self) -> tuple[float, float, float]:
+        """Largest speed, acceleration and jerk of one actuator; infinite where none is given."""
+        speed, acceleration, jerk = (
+            math.inf if size is None else size for size in (self.speed_m_s, self.acceleration_m_s2, self.jerk_m_s3)
+        )
+        return speed, acceleration, jerk
 
 
 class ReferenceSection(Section):
