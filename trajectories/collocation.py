@@ -39,7 +39,7 @@ LONGEST = 1e4
 #: that takes so many times the admitted duration, no other start is tried.
 AT_THE_END, FAR_LONGER = 0.9, 1.2
 #: CPU time for finding out why there is no motion, s.
-PATIENCE = 8.0
+PATIENCE = 6.0
 #: No other start is tried once the solver has taken so many iterations.
 ITERATIONS = 250
 
@@ -100,7 +100,8 @@ def solve(task: Task, begin: float = 0.0, guess: Guess | None = None) -> Motion:
     clock = _Clock(PATIENCE)
     shortest = _shortest(task, clock) if first.share > AT_THE_END else None
     hopeless = shortest is not None and shortest > FAR_LONGER * task.longest
-    relaxation = relaxed(task, first.start, HURRY if hopeless else ())
+    late = hopeless and clock.left < 0
+    relaxation = None if late else relaxed(task, first.start, HURRY if hopeless else ())
     if not hopeless:
         known = [] if relaxation is None or relaxation.widened else [relaxation.guess]
         motion = _elsewhere(task, (*known, *starts), first.iterations)
@@ -146,7 +147,7 @@ def _reasons(task: Task, relaxation: Relaxation | None, clock: _Clock) -> str:
     if relaxation is None or not relaxation.widened:
         return ""
     for growth in () if relaxation.crowded else GROWTHS:
-        if _Attempt(relaxation.task(task, growth), relaxation.guess, clock).run() is not None:
+        if clock.left > 0 and _Attempt(relaxation.task(task, growth), relaxation.guess, clock).run() is not None:
             return relaxation.text(growth)
     return relaxation.text(None)
 

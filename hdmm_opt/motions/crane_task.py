@@ -32,7 +32,7 @@ def crane_mover(least_lever: float = LEAST_LEVER) -> Mover:
     Args:
         least_lever: Shortest admissible lever arm of the actuators of lift and tilt, m/rad.
     """
-    w: Any = ca.SX.sym("w", 3)
+    w = ca.SX.sym("w", 3)
     across, up = tool(w)
     return Mover(
         limits=joint_limits(least_lever), pose=ca.Function("pose", [w], [ca.vertcat(across, up, w[0] + w[1])]),
@@ -50,8 +50,8 @@ def tool_function() -> ca.Function:
 @lru_cache(maxsize=8)
 def _drives(payload: float) -> Drives:
     """Forces, motor speeds, torques, currents and voltages of the EMLAs."""
-    symbols = [ca.SX.sym(name, 3) for name in "wvaj"]
-    found = drives(*symbols, payload)
+    w, v, a, j = symbols = [ca.SX.sym(name, 3) for name in "wvaj"]
+    found = drives(w, v, a, j, payload)
     column = ca.vertcat(found.force, found.speed, found.torque, found.current, found.voltage)
     limits = drive_limits()
     return Drives(

@@ -233,7 +233,7 @@ def test_an_arm_of_a_urdf_moves_inside_its_limits_by_pinocchio(kind, tmp_path):
         (ERRAND, "tolerance_m = 0.01\n", "", "tolerance_m is required with path_m"),
         (ERRAND, "angle_tolerance_rad = 0.05\n", "", "angle_tolerance_rad is required with path_m and angle_rad"),
         (ERRAND, "speed = [-0.05, 0.0, 0.0]", "angle_rad = 0.1", "angle_rad stands beside tool_m or path_m"),
-        (ERRAND, "current_a = 55.0", "current_a = 0.0", "current_a must be greater than 0"),
+        (ERRAND, "current_a = 55.0", "current_a = 0.0", r"current_a must be greater than or equal to 0\.0001"),
         (ERRAND, 'kind = "bspline"', 'kind = "toppra"', "has no cost, no via and no path_m"),
         (ERRAND, 'model = "crane"', 'model = "pmsm_emla"', 'plant.model of a motion alone is "crane" or "arm"'),
         (ERRAND, 'model = "crane"', 'model = "crane"\nlocked = { lift = 0.1 }', "plant.locked has no place"),
