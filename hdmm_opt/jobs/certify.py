@@ -171,10 +171,11 @@ def quadratic_bound(member: Member, values: Values, found: Certificate) -> str:
     return "none" if squared is None else f"{1e3 * math.sqrt(squared):.4g} m{unit}"
 
 
-def longest_period(problem: Problem, gains: GainSet) -> float:
+def longest_period(problem: Problem, gains: GainSet, *, proved: bool = False) -> float:
     """The largest control period of all members at which everything is certified, s, by bisection; 0 where none is.
 
-    Certified at the period returned, not certified at one a little longer; beyond, nothing is said.
+    Certified at the period returned, not certified at one a little longer; beyond, nothing is said. Where the own
+    period is `proved` already, shorter ones are not looked at.
     """
 
     def good(period: float) -> bool:
@@ -187,6 +188,8 @@ def longest_period(problem: Problem, gains: GainSet) -> float:
         while good(2 * high) and high < LONGEST * problem.period:
             high *= 2
         low, high = high, 2 * high
+    elif proved:
+        return high
     else:
         low = high / 2.0**steps
         if not good(low):

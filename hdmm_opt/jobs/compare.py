@@ -179,19 +179,18 @@ def table(found: Sequence[Contender], proved: Sequence[str], unit: str, writes: 
         unit: Unit of the output.
         writes: Called with each line.
     """
-    heads = (f"max [m{unit}]", f"RMS [m{unit}]", "limit use", f"certified [m{unit}]")
-    writes(
-        f"{'scenario':18}{'controller':17}" + "".join(f"{h:>{w}}" for h, w in zip(heads, (12, 13, 11, 18), strict=True))
-    )
+    heads = (f"max [m{unit}]", f"RMS [m{unit}]", "limit use", "certified")
+    widths = (11, 12, 11, 11)
+    writes(f"{'scenario':18}{'controller':16}" + "".join(f"{h:>{w}}" for h, w in zip(heads, widths, strict=True)))
     for scenario in found[0].figures:
         best = min(c.figures[scenario].rms_error_m for c in found)
         for c in found:
             m = c.figures[scenario]
             mark = "*" if not m.diverged and m.rms_error_m == best else " "
             size = (
-                f"{f'lost at {m.diverged_s:.3g} s':>25}"
+                f"{f'lost at {m.diverged_s:.3g} s':>23}"
                 if m.diverged
-                else f"{1e3 * m.maximum_error_m:12.3g}{1e3 * m.rms_error_m:12.3g}{mark}"
+                else f"{1e3 * m.maximum_error_m:11.3g}{1e3 * m.rms_error_m:11.3g}{mark}"
             )
             bound = "" if c.certified is None or scenario not in proved else upward(1e3 * c.certified)
-            writes(f"{scenario:18}{c.name:17}{size}{m.limit_use:11.3g}{bound:>18}")
+            writes(f"{scenario:18}{c.name:16}{size}{m.limit_use:11.3g}{bound:>11}")

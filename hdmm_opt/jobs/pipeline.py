@@ -118,7 +118,7 @@ def finished(
 
 
 def _rates(problem: Problem, tuned: Tuned) -> str:
-    own, longest = problem.period, longest_period(problem, tuned.gains)
+    own, longest = problem.period, longest_period(problem, tuned.gains, proved=True)
     if not longest > own:
         return f"with these gains no control rate below {1 / own:.4g} Hz was found at which it is proved"
     return f"with these gains a control rate down to {1 / longest:.4g} Hz ({longest * 1e3:.4g} ms) is proved too"

@@ -57,7 +57,7 @@ def search(
     def after(now: Population) -> None:
         state.put("search", to_data(now))
         cost = now.outcomes[now.best].cost
-        text = f"best {cost:.4g}" if math.isfinite(cost) else "none proved yet"
+        text = f"best {cost:.4g}" if math.isfinite(cost) else "none yet that is proved and meets its requirements"
         progress.update(now.evaluations / allowed.evaluations, text)
 
     window = Window.around(problem, start)

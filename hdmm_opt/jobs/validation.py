@@ -15,7 +15,7 @@ from ..problem import GainSet, Problem
 from ..problem.margins import output_bound
 from ..problem.problem import Contracts
 from ..simulation import Figures, Loop, Run, Scenario, scenarios, within_assumptions
-from ..simulation.requirements import missed
+from ..simulation.requirements import missed, missed_in
 from .worst_case import uncertain, worst_corner
 
 #: The integration error may be this share of the largest simulated error.
@@ -63,7 +63,7 @@ def validate(
         everything += random
     progress("integration error")
     estimate = loop.integration_error(gains, replace(given[0], faults={}))
-    failures = [text for s, m in everything for text in missed(problem, s.name, m)]
+    failures = missed_in(problem, [(s.name, m) for s, m in everything])
     seen = max((m.largest_error_m for _, m in (*runs, *everything)), default=0.0)
     if not estimate <= INTEGRATION_SHARE * seen:
         failures.append(

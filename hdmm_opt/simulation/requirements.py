@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 
 from ..problem import Problem
 from .figures import Figures
@@ -56,6 +57,23 @@ def missed(problem: Problem, name: str, figures: Figures) -> list[str]:
         if not value <= limit:
             found.append(f"{requirement} = {limit:g} is missed in scenario {name}: {value:.4g}")
     return found
+
+
+def missed_in(problem: Problem, runs: Sequence[tuple[str, Figures]]) -> list[str]:
+    """Requirements that some of the named runs missed, one line each: the worst run, and how many more there are."""
+    lost = [(name, figures.diverged_s) for name, figures in runs if figures.diverged]
+    found = [f"lost at {lost[0][1]:.3g} s in scenario {lost[0][0]}{_more(len(lost))}"] if lost else []
+    for requirement, limit in required(problem).items():
+        values = [(figure_of(problem, requirement, figures), name) for name, figures in runs]
+        bad = [(value, name) for value, name in values if not value <= limit]
+        if bad:
+            value, name = max(bad, key=lambda entry: math.inf if math.isnan(entry[0]) else entry[0])
+            found.append(f"{requirement} = {limit:g} is missed in scenario {name}: {value:.4g}{_more(len(bad))}")
+    return found
+
+
+def _more(count: int) -> str:
+    return "" if count == 1 else f", and in {count - 1} more"
 
 
 def reached(problem: Problem, requirement: str, runs: Iterable[Figures]) -> float | None:

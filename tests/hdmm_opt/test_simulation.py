@@ -244,3 +244,18 @@ def test_loops_run_at_several_rates():
     data["controller"]["rates_hz"] = {"tilt": 300}
     with pytest.raises(InvalidInputError, match=r"must divide the fastest rate, 1000 Hz: got 300; 333\.333 would do"):
         assemble(study_from(data))
+
+
+def test_missed_requirements_are_one_line_each(monkeypatch):
+    """The worst run, and how many more."""
+    from types import SimpleNamespace
+
+    from hdmm_opt.simulation import requirements
+
+    runs = [(name, SimpleNamespace(diverged=False, value=v)) for name, v in (("a", 1.0), ("b", 3.0), ("c", 2.5))]
+    monkeypatch.setattr(requirements, "required", lambda problem: {"peak_torque_nm": 2.0, "rms_torque_nm": 9.0})
+    monkeypatch.setattr(requirements, "figure_of", lambda problem, name, figures: figures.value)
+    assert requirements.missed_in(None, runs) == ["peak_torque_nm = 2 is missed in scenario b: 3, and in 1 more"]
+    runs.append(("d", SimpleNamespace(diverged=True, diverged_s=0.5, value=float("nan"))))
+    lines = requirements.missed_in(None, runs)
+    assert lines[0] == "lost at 0.5 s in scenario d" and lines[1].endswith("scenario d: nan, and in 2 more")
