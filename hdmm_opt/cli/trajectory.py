@@ -73,13 +73,16 @@ def _references(problem: Problem) -> dict[str, Any]:
 
 def _members(problem: Problem) -> None:
     """Peaks of every member beside what limits them."""
-    from ..motions.single_axis import effort_table
+    from ..motions.single_axis import effort_table, largest_loads
 
     if problem.loads is None:
         (member,) = problem.members
         for row in effort_table(problem.study, member.plant, member.reference):
             limit = "no limit" if row["limit"] is None else f"limit {row['limit']:g}"
             click.echo(f"  {row['quantity']:13} {row['peak']:10.4g} {row['unit']:6} {limit}")
+        if member.plant.efforts is not None:
+            loads = ", ".join(f"{load:g} {member.plant.load_unit}" for load in largest_loads(problem.study))
+            click.echo(f"  efforts at the nominal machine under the largest load, {loads}")
         return
     foreseen = problem.loads.feedforward(problem.slices)
     for member, (load, _), own in zip(problem.members, foreseen, problem.machine.own, strict=True):
