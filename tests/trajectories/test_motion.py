@@ -344,3 +344,52 @@ def test_what_makes_no_sense_is_refused(make, message):
 def test_limits_of_quantities_cannot_be_changed_behind_a_cache():
     with pytest.raises(ValueError, match="read-only"):
         push(lambda x, v, a, j: a, 0.0, 1.0).upper[0] = 2.0
+
+
+def test_a_kept_program_gives_the_same_motion():
+    """Tasks that differ in places alone share a program, and leave no trace in each other's motions."""
+    from trajectories import program
+    from trajectories.solver import solver_of
+
+    first, other = (
+        Task(waypoints=(at(0, 0, 0), at(*goal)), limits=LIMITS) for goal in ((1.0, 0.5, 0.8), (0.4, 0.9, 0.1))
+    )
+    program._built.cache_clear()
+    solver_of.cache_clear()
+    found = [solve(task).spline.coefficients for task in (first, other, first)]
+    assert program._built.cache_info().misses == 1 and program._built.cache_info().hits >= 2
+    assert np.array_equal(found[0], found[2]) and not np.allclose(found[0], found[1])
+
+
+def test_a_motion_starts_and_ends_moving_and_keeps_to_its_tolerance():
+    speed, acceleration = np.array([0.05, -0.02, 0.1]), np.array([0.1, 0.0, -0.05])
+    start = Waypoint(value=np.zeros(3), speed=speed, acceleration=acceleration)
+    via = Waypoint(value=np.array([0.5, 0.4, 0.3]), tolerance=np.array([0.02, 0.0, 0.02]))
+    goal = Waypoint(value=np.array([1.0, 0.5, 0.8]), speed=-speed)
+    motion = solve(Task(waypoints=(start, via, goal), limits=LIMITS))
+    for got, wanted in zip(
+        (motion.spline([0.0], k)[0] for k in range(3)), (np.zeros(3), speed, acceleration), strict=True
+    ):
+        assert got == pytest.approx(wanted, abs=1e-7)
+    assert motion.spline([motion.spline.end], 1)[0] == pytest.approx(-speed, abs=1e-7)
+    off = np.abs(motion.spline([motion.arrivals[0]])[0] - via.value)
+    assert off[1] < 1e-7 and (off <= 0.02 + 1e-9).all() and off.max() > 0.01  # the room is used
+    assert not violations(motion.spline, LIMITS)
+    exact = solve(Task(waypoints=(start, Waypoint(value=via.value), goal), limits=LIMITS))
+    assert motion.cost < exact.cost
+    with pytest.raises(LimitViolatedError, match=r"at the start, .* speed is 9 "):
+        fast = Waypoint(value=np.zeros(3), speed=np.array([9.0, 0.0, 0.0]))
+        solve(Task(waypoints=(fast, goal), limits=LIMITS))
+    with pytest.raises(ValueError, match="give the speed too"):
+        Waypoint(value=np.zeros(3), acceleration=speed)
+
+
+def test_a_jerk_limited_move_starts_and_ends_moving():
+    speed, acceleration = np.array([0.05, -0.02, 0.1]), np.array([0.1, 0.0, -0.05])
+    spline = jerk_limited(
+        np.zeros(3), [1.0, 0.5, 0.8], LIMITS, speeds=(speed, -speed / 2), acceleration=acceleration
+    )  # fmt: skip
+    for order, wanted in enumerate((np.zeros(3), speed, acceleration)):
+        assert spline([0.0], order)[0] == pytest.approx(wanted, abs=1e-9)
+    assert spline([spline.end])[0] == pytest.approx([1.0, 0.5, 0.8])
+    assert spline([spline.end], 1)[0] == pytest.approx(-speed / 2, abs=1e-6)
