@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .diagnosis import Relaxation, at_rest, refusal, relaxed
+from .diagnosis import Relaxation, refusal, reject_places, relaxed
 from .guess import Guess, guesses, straight
-from .limits import LimitViolatedError, violations
+from .limits import violations
 from .nodes import POINTS, TIGHTENING, gauss
 from .program import Program, build
 from .quantity import Peaks, Quantities, peaks
 from .solver import AGAIN, ELSEWHERE, FLOOR, HURRY, NEAR, assembled, bounds, solver_of
 from .spline import Spline, clamped_knots
-from .task import Cost, Task, Waypoint
+from .task import Cost, Task
 
 Array = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ def solve(task: Task, begin: float = 0.0, guess: Guess | None = None) -> Motion:
     Not guaranteed: global optimality. A bound by control points is conservative by the distance between polygon and
     curve, which falls with the square of the number of spans.
     """
-    _reject_places(task)
+    reject_places(task)
     starts = guesses(task) if guess is None else iter([guess])
     first = _Attempt(task, next(starts))
     motion = first.run()
@@ -157,39 +157,6 @@ def _shortest(task: Task, clock: _Clock) -> float | None:
     longer = replace(task, cost=Cost(), duration=None, longest=LONGEST)
     motion = _Attempt(longer, straight(longer), clock).run()
     return None if motion is None else motion.parts["time"]
-
-
-def _reject_places(task: Task) -> None:
-    low, high = task.limits.room
-    for waypoint in task.waypoints:
-        for k, value in enumerate(waypoint.known):
-            if not np.isnan(value) and not low[k] <= value <= high[k]:
-                name, unit = f"{task.limits.names[k]} position".strip(), task.limits.units[k]
-                raise LimitViolatedError(
-                    f"{name} {value:g} {unit} leaves the stroke {low[k]:g}…{high[k]:g} {unit}; move the waypoint"
-                )
-    for which, waypoint in (("start", task.waypoints[0]), ("goal", task.waypoints[-1])):
-        if waypoint.moving:
-            _reject_rates(task, which, waypoint)
-        elif not np.isnan(waypoint.known).any():
-            over = at_rest(task, waypoint.known)
-            if over:
-                raise LimitViolatedError(f"no motion: at rest at the {which}, {over}")
-
-
-def _reject_rates(task: Task, which: str, waypoint: Waypoint) -> None:
-    """A speed or an acceleration at an end that is over its limit."""
-    for order in (1, 2):
-        sizes, limits = np.abs(waypoint.rate(order, len(task.limits.names))), task.limits.of(order)
-        over = np.flatnonzero(sizes > limits * (1 - TIGHTENING / 2))
-        if len(over):
-            k = int(over[0])
-            unit = task.limits.unit(order, k)
-            raise LimitViolatedError(
-                f"no motion: at the {which}, {task.limits.title(order, k)} is {sizes[k]:g} {unit}, "
-                f"its limit {limits[k]:g} {unit} less {50 * TIGHTENING:g} % in reserve: start it "
-                "slower, or widen that limit"
-            )
 
 
 class _Attempt:

@@ -15,7 +15,7 @@ from .nodes import TIGHTENING
 from .program import build
 from .solver import assembled, bounds, solver_of
 from .spline import Spline
-from .task import Limit, Task
+from .task import Limit, Task, Waypoint
 
 Array = NDArray[np.float64]
 
@@ -110,6 +110,44 @@ def at_rest(task: Task, place: Array) -> str:
                     "reserve: that limit must be wider, or the place another"
                 )
     return "; ".join(found)
+
+
+def reject_places(task: Task) -> None:
+    """Refuse waypoints outside their ranges, and ends where the machine can neither rest nor move as it is to.
+
+    Raises:
+        LimitViolatedError: one of them.
+    """
+    low, high = task.limits.room
+    for waypoint in task.waypoints:
+        for k, value in enumerate(waypoint.known):
+            if not np.isnan(value) and not low[k] <= value <= high[k]:
+                name, unit = f"{task.limits.names[k]} position".strip(), task.limits.units[k]
+                raise LimitViolatedError(
+                    f"{name} {value:g} {unit} leaves the stroke {low[k]:g}…{high[k]:g} {unit}; move the waypoint"
+                )
+    for which, waypoint in (("start", task.waypoints[0]), ("goal", task.waypoints[-1])):
+        if waypoint.moving:
+            _reject_rates(task, which, waypoint)
+        elif not np.isnan(waypoint.known).any():
+            over = at_rest(task, waypoint.known)
+            if over:
+                raise LimitViolatedError(f"no motion: at rest at the {which}, {over}")
+
+
+def _reject_rates(task: Task, which: str, waypoint: Waypoint) -> None:
+    """A speed or an acceleration at an end that is over its limit."""
+    for order in (1, 2):
+        sizes, limits = np.abs(waypoint.rate(order, len(task.limits.names))), task.limits.of(order)
+        over = np.flatnonzero(sizes > limits * (1 - TIGHTENING / 2))
+        if len(over):
+            k = int(over[0])
+            unit = task.limits.unit(order, k)
+            raise LimitViolatedError(
+                f"no motion: at the {which}, {task.limits.title(order, k)} is {sizes[k]:g} {unit}, "
+                f"its limit {limits[k]:g} {unit} less {50 * TIGHTENING:g} % in reserve: start it "
+                "slower, or widen that limit"
+            )
 
 
 def relaxed(task: Task, start: Guess, options: tuple[tuple[str, Any], ...] = ()) -> Relaxation | None:

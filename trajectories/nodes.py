@@ -95,14 +95,13 @@ def _node(
     if any(weights):
         rate += ca.dot(ca.DM(weights), running(*given))
     rate, rows = ca.cse([rate, rows])  # before and after differentiation: a third of the instructions remains
-    z, t, factor, weight = (ca.SX.sym(name, size) for name, size in (("z", orders * count), ("t", 1), ("s", 1),
-                                                                    ("l", rows.numel())))  # fmt: skip
+    z, t = ca.SX.sym("z", orders * count), ca.SX.sym("t")
+    factor, weight = ca.SX.sym("s"), ca.SX.sym("l", rows.numel())
     # by the chain rule through position … jerk in time: half the instructions of differentiating by w
     inner, share = ca.vertcat(curves, slack), ca.SX.sym("share")
     slope, slopes = ca.jacobian(rate, inner), ca.jacobian(rows, inner)
-    first = ca.densify(
-        ca.vertcat(share * slope.T + slopes.T @ weight, rate)
-    )  # of share * rate + weight' rows, by (inner, share)
+    # the gradient of share * rate + weight' rows by (inner, share)
+    first = ca.densify(ca.vertcat(share * slope.T + slopes.T @ weight, rate))
     second = ca.jacobian(first, ca.vertcat(inner, share))
     w = ca.vertcat(z, t, slack)
     outer = ca.vertcat(*(z[m * count : (m + 1) * count] / t**m for m in range(orders)), slack)

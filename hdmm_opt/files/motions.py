@@ -9,7 +9,6 @@ import numpy as np
 
 from trajectories import Motion
 
-from ..motions.mover import Mover
 from ..motions.sequence import Motions
 from ..study.motion import MotionStudy
 from .text import csv_text
@@ -78,7 +77,7 @@ def _points(motion: Motion) -> list[dict[str, Any]]:
 def table(ways: Sequence[Motions]) -> str:
     """The points of all motions as CSV; the header carries the units."""
     orders = (("position", ""), ("speed", "/s"), ("acceleration", "/s^2"))
-    mover: Mover = ways[0].job.mover
+    mover = ways[0].job.mover
     joints = list(zip(mover.names, mover.limits.units, strict=True))
     heads = [f"{joint} {what} [{unit}{per}]" for what, per in orders for joint, unit in joints]
     rows = [

@@ -6,17 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from trajectories import LimitViolatedError, Spline
+from trajectories import Spline
 from trajectories.spline import clamped_knots, fitted
 
-from ..errors import InvalidInputError
 from ..machines.crane_dynamics import JOINTS, strokes
 from ..machines.crane_geometry import LIFT, TILT
 from ..machines.machine import Machine
 from ..study import Study
-from .crane_task import crane_cost
-from .job import Job, Move
-from .sequence import carried_out
+from .crane_task import crane_mover
+from .least_time import least_time
 
 
 def crane_moves(study: Study, machine: Machine) -> list[list[Spline]]:
@@ -39,22 +37,11 @@ def crane_moves(study: Study, machine: Machine) -> list[list[Spline]]:
         return (first, second, third)
 
     places = [whole(place) for place in section.waypoints]
-    payload = study.uncertainty.disturbances["payload"].range[1]
-    job = Job(
-        start=places[0], moves=tuple(Move(joints=place, payload=payload) for place in places[1:]),
-        longest=section.longest_s,
-    )  # fmt: skip
-    try:
-        found = carried_out(
-            job, lambda mass: crane_cost(payload=mass, time=1.0, jerk=section.jerk_weight), "reference",
-            spans=section.spans,
-        )  # fmt: skip
-    except LimitViolatedError as error:
-        raise InvalidInputError(f"reference: {error}") from None
+    motions = least_time(study, crane_mover(), places)
     w = ca.SX.sym("w", 3)
     stroke = ca.Function("stroke", [w], [strokes(w)])
     kept = [k for k, name in enumerate(JOINTS) if name not in locked]
-    return [_strokes(motion.spline, stroke, kept, 2 * section.spans) for motion in found.motions]
+    return [_strokes(motion.spline, stroke, kept, 2 * section.spans) for motion in motions]
 
 
 def _coordinate(name: str, stroke: float) -> float:

@@ -10,9 +10,10 @@ from trajectories import Ball, HalfSpace, Obstacle
 
 from ..machines.registry import model
 from ..study.motion import LimitsSection, MotionStudy, MoveSection, ObstacleSection, PlaceSection
+from ..study.sections import SPANS
 from .arm_mover import arm_mover
 from .crane_task import crane_mover
-from .job import SPANS, Job, Move, Place
+from .job import Job, Move, Place
 from .mover import Bounded, Mover
 from .sequence import Motions, carried_out
 from .two_level import bilevel

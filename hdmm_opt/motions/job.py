@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from trajectories import MotionLimits, Obstacle, Quantities, Task, Waypoint
 
 from ..errors import InvalidInputError
+from ..study.sections import SPANS
 from .crane_task import crane_mover
 from .mover import Bounded, Mover
 
 Array = NDArray[np.float64]
 
-#: Spans of a motion of one phase, and the fewest of a phase where there are many.
-SPANS, FEWEST = 36, 8
+#: The fewest spans of a phase where there are many.
+FEWEST = 8
 
 
 def spans_of(phases: int) -> int:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajectories import Cost, LimitViolatedError, MotionLimits, Quantities
+from trajectories.limits import ORDERS
 from trajectories.obstacle import Obstacle
 
 from ..errors import InvalidInputError
@@ -44,7 +45,7 @@ class Bounded:
 
     def of(self, limits: MotionLimits) -> MotionLimits:
         """Limits of the joints with these in place of theirs."""
-        own = {name: np.array(size) for name in ("speed", "acceleration", "jerk") if (size := getattr(self, name))}
+        own = {name: np.array(size) for name in ORDERS.values() if (size := getattr(self, name))}
         return replace(limits, **own)
 
 

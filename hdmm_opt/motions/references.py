@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trajectories import LimitViolatedError, MotionLimits, Reference, Spline, constant, quintic, violations
+from trajectories import MotionLimits, Reference, Spline, constant, quintic, violations
 
 from ..errors import InvalidInputError
 from ..machines.machine import Machine
@@ -14,9 +14,8 @@ from ..study import Study
 from ..study.reference import MotionLimitSection
 from .arm_mover import arm_mover
 from .crane_moves import crane_moves
-from .job import Job, Move
-from .mover import Bounded, Mover
-from .sequence import carried_out
+from .least_time import least_time
+from .mover import Bounded
 from .single_axis import axis_moves
 
 #: From a study and its machine to the moves, each a spline of every member that starts at time 0.
@@ -32,7 +31,8 @@ def joint_moves(study: Study, machine: Machine) -> list[list[Spline]]:
     section, limits = study.reference, study.reference.limits or MotionLimitSection()
     bounds = Bounded(speed=limits.speed, acceleration=limits.acceleration, jerk=limits.jerk)
     if section.kind == "bspline":
-        return _least_time(study, arm_mover(machine), bounds)
+        motions = least_time(study, arm_mover(machine), section.waypoints, bounds)
+        return [[motion.spline.coordinate(k) for k in range(len(machine.members))] for motion in motions]
     moves = [
         [quintic(a, b, 0.0, duration) for a, b in zip(start, goal, strict=True)]
         for start, goal, duration in zip(section.waypoints, section.waypoints[1:], section.durations_s, strict=False)
@@ -45,22 +45,6 @@ def joint_moves(study: Study, machine: Machine) -> list[list[Spline]]:
         if broken:
             raise InvalidInputError(f"reference: move {k}: {broken[0]}; allow more time, or widen the limit")
     return moves
-
-
-def _least_time(study: Study, mover: Mover, bounds: Bounded) -> list[list[Spline]]:
-    """Minimum-time moves of an arm with a weight on jerk, at the largest payload."""
-    section, payload = study.reference, max(study.uncertainty.disturbances["payload"].range)
-    job = Job(
-        mover=mover, start=section.waypoints[0], longest=section.longest_s, bounds=bounds,
-        moves=tuple(Move(joints=place, payload=payload) for place in section.waypoints[1:]),
-    )  # fmt: skip
-    try:
-        found = carried_out(
-            job, lambda mass: mover.cost(payload=mass, jerk=section.jerk_weight), "reference", spans=section.spans
-        )
-    except LimitViolatedError as error:
-        raise InvalidInputError(f"reference: {error}") from None
-    return [[motion.spline.coordinate(k) for k in range(len(mover.names))] for motion in found.motions]
 
 
 #: Planners by the name that a machine gives.

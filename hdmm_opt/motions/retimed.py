@@ -19,6 +19,7 @@ from trajectories import (
     retime,
     violations,
 )
+from trajectories.limits import ORDERS
 from trajectories.quantity import Quantities
 
 from .enclosure import enclosure
@@ -27,7 +28,7 @@ from .job import Job, Move, State
 #: Intervals of TOPP-RA on a line.
 GRID = 120
 #: Shares of the limits of the joints that Ruckig is given, one after the other, until the drives are inside theirs.
-SHARES: tuple[float, ...] = (1.0, 0.9, 0.8, 0.65, 0.5, 0.35, 0.25)
+SHARES = (1.0, 0.9, 0.8, 0.65, 0.5, 0.35, 0.25)
 
 
 def retimed_motion(job: Job, at: State, goal: Any, move: Move, cost: Any) -> Motion:
@@ -42,10 +43,13 @@ def retimed_motion(job: Job, at: State, goal: Any, move: Move, cost: Any) -> Mot
     if at.speed is not None or move.speed is not None:
         raise ValueError("TOPP-RA moves from rest to rest here: got a speed")
     quantities = job.quantities(move.payload, jerk=False)
-    _reject(Spline(knots=np.array([0.0, 0, 1, 1]), coefficients=np.array([at.place, goal])), job.limits, position=True)
-    found = retime(bezier([at.place, goal]), _finite(job.limits), enclosure, quantities, grid=GRID)
+    still = dict.fromkeys(ORDERS.values(), np.inf)
+    line = Spline(knots=np.array([0.0, 0, 1, 1]), coefficients=np.array([at.place, goal]))
+    _reject(line, replace(job.limits, **still))
+    found = retime(bezier([at.place, goal]), job.limits, enclosure, quantities, grid=GRID)
     points = at.place + found.law.coefficients[:, None] * (np.asarray(goal) - at.place)
-    return _checked(job, Spline(knots=found.law.knots, coefficients=points), quantities, cost, jerk=False)
+    spline = Spline(knots=found.law.knots, coefficients=points)
+    return _checked(job, spline, replace(job.limits, jerk=np.inf), quantities, cost)
 
 
 def jerk_limited_motion(job: Job, at: State, goal: Any, move: Move, cost: Any) -> Motion:
@@ -57,31 +61,25 @@ def jerk_limited_motion(job: Job, at: State, goal: Any, move: Move, cost: Any) -
     """
     quantities, reason = job.quantities(move.payload), ""
     for share in SHARES:
-        sizes = {name: share * job.limits.of(order) for order, name in enumerate(("speed", "acceleration", "jerk"), 1)}
+        sizes = {name: share * job.limits.of(order) for order, name in ORDERS.items()}
         limits = replace(job.limits, **sizes)
         try:
             spline = jerk_limited(at.place, goal, limits, speeds=(at.speed, move.speed), acceleration=at.acceleration)
-            return _checked(job, spline, quantities, cost, jerk=True)
+            return _checked(job, spline, job.limits, quantities, cost)
         except LimitViolatedError as error:
             reason = str(error)
     raise LimitViolatedError(f'{reason}, with {SHARES[-1]:.0%} of the joints\' limits; use kind = "bspline"')
 
 
-def _finite(limits: MotionLimits) -> MotionLimits:
-    """Limits without those of the jerk."""
-    return replace(limits, jerk=np.inf)
-
-
-def _reject(spline: Spline, limits: MotionLimits, *, position: bool = False) -> None:
-    given = replace(limits, speed=np.inf, acceleration=np.inf, jerk=np.inf) if position else limits
-    broken = violations(spline, given)
+def _reject(spline: Spline, limits: MotionLimits) -> None:
+    broken = violations(spline, limits)
     if broken:
         raise LimitViolatedError(broken[0])
 
 
-def _checked(job: Job, spline: Spline, quantities: Quantities, cost: Any, *, jerk: bool) -> Motion:
+def _checked(job: Job, spline: Spline, limits: MotionLimits, quantities: Quantities, cost: Any) -> Motion:
     """The motion, inside every limit for all t."""
-    _reject(spline, job.limits if jerk else _finite(job.limits))
+    _reject(spline, limits)
     found = peaks(spline, quantities)
     if not found.inside:
         worst = int((found.excess.max(axis=1) / quantities.scale).argmax())

@@ -21,8 +21,8 @@ from trajectories import LimitViolatedError, Motion, solve
 
 from ..errors import InvalidInputError
 from ..machines.crane_geometry import reach
-from .crane_task import crane_cost
-from .job import SPANS, Job, Move
+from ..study.sections import SPANS
+from .job import Job, Move
 from .sequence import Motions, carried_out
 
 Array = NDArray[np.float64]
@@ -75,13 +75,13 @@ def bilevel(
             'or use kind = "bspline"'
         )
     costs = (("time", {"time": 1.0}), ("effort", {"time": 0.0, "effort": 1.0}), ("energy", {"time": 0.0, "loss": 1e-3}))
-    ways = [carried_out(job, _cost(weights), f"{name}-optimal", spans=spans) for name, weights in costs]
+    ways = [carried_out(job, _cost(job, weights), f"{name}-optimal", spans=spans) for name, weights in costs]
     leader = _Leader(job, ways, tick, spans)
     return Bilevel(ways=(*ways, leader.search(evaluations)), history=tuple(leader.history))
 
 
-def _cost(weights: dict[str, float]) -> Callable[[float], Any]:
-    return lambda payload: crane_cost(payload=payload, **weights)
+def _cost(job: Job, weights: dict[str, float]) -> Callable[[float], Any]:
+    return lambda payload: job.mover.cost(payload=payload, **weights)
 
 
 class _Leader:
@@ -148,7 +148,7 @@ class _Leader:
         )
         for move, duration, led in zip(self.job.moves, durations, self.start.motions, strict=False):
             end = np.array(move.joints) if move.tool is None else self.place(move, next(extensions), led)
-            cost = crane_cost(time=0.0, jerk=1.0, payload=move.payload)
+            cost = self.job.mover.cost(time=0.0, jerk=1.0, payload=move.payload)
             task = self.job.task((at, end), move.payload, cost=cost, duration=float(duration), spans=self.spans)
             motions.append(solve(task))
             at = end

@@ -51,12 +51,7 @@ def figure_of(problem: Problem, name: str, figures: Figures) -> float:
 
 def missed(problem: Problem, name: str, figures: Figures) -> list[str]:
     """Requirements that a run missed, as text."""
-    found = [f"lost at {figures.diverged_s:.3g} s in scenario {name}"] if figures.diverged else []
-    for requirement, limit in required(problem).items():
-        value = figure_of(problem, requirement, figures)
-        if not value <= limit:
-            found.append(f"{requirement} = {limit:g} is missed in scenario {name}: {value:.4g}")
-    return found
+    return missed_in(problem, [(name, figures)])
 
 
 def missed_in(problem: Problem, runs: Sequence[tuple[str, Figures]]) -> list[str]:

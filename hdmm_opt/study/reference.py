@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from .messages import refused
-from .sections import NonNegative, Places, Positive, Section
+from .sections import SPANS, NonNegative, Places, Positive, Section
 
 #: An entry for each member.
 Sizes = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=16)]
@@ -52,7 +52,7 @@ class ReferenceSection(Section):
     pace: Annotated[float, Field(gt=0, le=1)] = 1.0
     jerk_weight: NonNegative = 0.05
     longest_s: Positive = 60.0
-    spans: Annotated[int, Field(ge=6, le=200)] = 36
+    spans: Annotated[int, Field(ge=6, le=200)] = SPANS
     limits: MotionLimitSection | None = None
 
     @model_validator(mode="after")

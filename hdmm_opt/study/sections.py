@@ -14,6 +14,8 @@ Share = Annotated[float, Field(ge=-1, le=1)]
 Pair = tuple[float, float]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,31}$")]
 
+#: Spans of a motion of one phase where a study gives none.
+SPANS = 36
 #: No quantity of these machines is larger in SI units.
 LARGEST = 1e12
 
