@@ -67,31 +67,35 @@ reading: Reads what a file says of a member, and refuses what is not the study's
   Must fail: an assumption narrower than the study, a gain outside its range, a law that reads what it cannot know, a
   plant that does not feel what the study states.
 
-loop: The closed loop in error coordinates: M_i Q_i' = sum S_ij Q_j + d_i over the assumed box.
+loop: The closed loop around the moving operating point, with the input as it is held.
 
-  Obligations: composition, sampling, adaptation. Must fail: a sign of plant or law, a smaller box, more noise.
+  Theorem: interval enclosures of every coefficient (docs/proof.md). Must fail: a sign of plant or law, a smaller box,
+  more noise, a demand that a network cannot meet.
 
-deviation: The closed loop around the moving operating point, with the input as it is held.
+matrices: Matrices in fixed point with one bound on all their errors, and exact inverses.
 
-matrices: Matrices of fractions, and the exponential of one in fixed point with a bound on its error.
+  Theorem: |a b - a' b'| <= |a| |b - b'| + |a - a'| |b| + |a - a'| |b - b'|; the remainder of an exponential's series.
 
-period: The map over a control period and the positive system that bounds it.
+turn: One control period of the whole sampled loop: plant, load networks and pending inputs as one exact map.
 
-  Theorem: |y(t + T)| <= A |y| + b at every vertex of the inertias, by comparison (docs/proof.md). Must fail: other
-  coordinates, fewer cells, a cell of another range.
+  Theorem: variation of constants. Must fail: another delay, a network or a pending input left out.
+
+sums: Integrals over a sub-step, and sums of bounds, in whole numbers rounded up.
+
+  Theorem: ∫|f| <= max(|∫f|, h²/2 sup|f'|), for where f changes its sign it is no larger than the distance from there.
+
+responses: L1 norms of the impulse responses of a sampled loop.
+
+  Theorem: Khammash and Pearson (1991); Bamieh, Dahleh and Pearson (1993) for a kernel of two times; docs/proof.md for
+  the sums. Must fail: coordinates in which a period does not contract, fewer periods, a smaller weight.
 
 obligation: One verdict, and the verdicts on a file; bounds and margins in few digits that hold.
 
-composition: The composition certificate: a Lyapunov function of all subsystems.
+impulse: The impulse-response certificate.
 
-  Theorem: V = sum w_i M_i Q_i^2 / 2 decays to a level (theory of docs/proof.md); the matrix condition by exact LDL^T
-  at every sign vertex (Rohn 1994). Obligations: composition, invariance, sampling, accuracy. Must fail: smaller
-  weights, a faster decay, theta in V where it does not adapt.
-
-sampled: The sampled certificate: a comparison system on the exact zero-order-hold map.
-
-  Theorem: A R + b <= R is never left, A s <= (1 - mu T) s tells how fast R is reached (Bellman 1962; Siljak 1978).
-  Obligations: contraction, invariance, sampling, accuracy. Must fail: smaller reach, start or shape, a faster decay.
+  Theorem: sup y <= y0 + Λ S sup y with Λ S s < s for some s > 0 gives sup y <= (I - Λ S)^-1 y0 (Khammash and Pearson
+  1991; Dahleh and Diaz-Bobillo 1995, ch. 7). Obligations: contraction, small gain, invariance, accuracy. Must fail: a
+  smaller box, less of what acts, a faster decay.
 
 golden: Golden vectors follow from the gains and the law, to float accuracy.
 
@@ -102,7 +106,7 @@ effects: Whether a plant and a coupling feel what the study states.
 
 obligations: All obligations of a member, decided.
 
-  Obligations: non-vacuity, reference, authority, adaptation, rounding, accuracy, and those of the certificate's kind.
+  Obligations: plant, non-vacuity, reference, authority, adaptation, rounding, accuracy, and those of the certificate.
   Must fail: lower limits, a shorter stroke, a tighter requirement, a faster adaptation than the rate allows.
 
 member: A member of a machine: read, decided, and compared with what the file records.
@@ -131,12 +135,13 @@ import hashlib
 import io
 import json
 import math
+import operator
 import os
 import re
 import stat
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
@@ -146,31 +151,23 @@ from typing import Any
 
 # --- limits ---
 
-#: What must be proved of every member whatever its law.
-COMMON = (
-    "plant",
-    "non-vacuity",
-    "reference",
-    "invariance",
-    "authority",
-    "sampling",
-    "adaptation",
-    "rounding",
-    "accuracy",
-)
 SCHEMA = "hdmm-opt/gains/2"
 #: What must be proved of each member for its law and its kind of certificate; a file that leaves one out is refused.
 REQUIRED = {
     "rac": {
-        "composition": ("composition", *COMMON),
-        "sampled": ("contraction", *COMMON),
+        "impulse": (
+            "plant", "non-vacuity", "reference", "contraction", "small gain", "invariance", "authority", "adaptation",
+            "rounding", "accuracy",
+        ),
     }
-}
-#: Vectors of each kind of certificate.
-VECTORS = {"composition": ("weights", "young", "leak"), "sampled": ("reach", "start", "shape")}
+}  # fmt: skip
 MAX_BYTES, MAX_DIGITS, MAX_EXPONENT, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 2_000_000, 60, 60, 12_000, 8, 1_000
-#: Cells of a sampled certificate.
-MAX_CELLS = 64
+#: Cells of a certificate, states of a loop with all that it remembers, groups of periods that are summed.
+MAX_CELLS, MAX_ORDER, MAX_GROUPS = 64, 24, 400
+#: Largest number of periods in a group, and of periods of delay.
+MAX_GROUP, MAX_DELAY = 2_000, 8
+#: A parameter that may change in a run: faults take effectiveness.
+VARYING = "effectiveness"
 #: A range of an assumption is that of the study to this share: it is written rounded outwards.
 ROUND = Fraction(1, 10**12)
 #: A place is met and a duration kept to this share of its size and a picometre or picosecond; a limit to that share.
@@ -192,8 +189,8 @@ SPEED_PARTS, LOAD_PARTS = 48, 4
 #: Relative width given to every gain, so that the proof holds for its decimal, its float64 and its float32.
 ROUNDING = Fraction(1, 2**23)
 BITS, MAX_SHIFT = 96, 3_000
-#: Fixed-point bits of matrix exponentials, terms of their series, largest norm, and a bound on all their errors.
-FIXED, TERMS, MAX_NORM, FIXED_ERROR = 192, 120, 20, Fraction(1, 2**100)
+#: Fixed-point bits of matrices, terms of an exponential's series, and its largest norm.
+FIXED, TERMS, MAX_NORM = 160, 120, 20
 #: Fractional bits of the fixed-point intervals of a coupling, and bits beyond which nothing is proved.
 SCALE, MAX_FIXED = 160, 1_000
 #: A unit, such as "kg m^2", "N m" or "rad/s".
@@ -432,13 +429,13 @@ def walk(
     """Run an operation list in any arithmetic; returns every entry."""
     table: list[Any] = []
     WORK.one(len(program["operations"]) // 64)
-    for operator, *arguments in program["operations"]:
-        if operator == "input":
+    for name, *arguments in program["operations"]:
+        if name == "input":
             table.append(read(arguments[0]))
-        elif operator == "const":
+        elif name == "const":
             table.append(const(Fraction(arguments[0])))
         else:
-            table.append(apply(operator, *(table[i] for i in arguments)))
+            table.append(apply(name, *(table[i] for i in arguments)))
     return table
 
 
@@ -465,7 +462,8 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
         if operator == "sub":
             return table.node(key, plus(a.form, times(b.form, neg(ONE))), add(a.range, neg(b.range)))
         if operator == "div":
-            return table.node(key, times(a.form, inverse(b.range)), mul(a.range, inverse(b.range)))
+            form, natural = times(a.form, inverse(b.range)), mul(a.range, inverse(b.range))
+            return (table.node if set(b.form) <= {""} else table.fresh)(key, form, natural)
         return multiply(key, a, b)
 
     def multiply(key: int, a: Node, b: Node) -> Node:
@@ -474,10 +472,17 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
             if set(one.form) <= {""}:
                 return table.node(key, times(other.form, one.form.get("", ZERO)), natural)
         wide, narrow = (a, b) if magnitude(a.range) >= magnitude(b.range) else (b, a)
+        if outside(narrow.form) and not outside(wide.form):
+            wide, narrow = narrow, wide
         return table.fresh(key, times(narrow.form, wide.range), natural)
 
     entries = walk(program, inputs.__getitem__, const, apply)
     return [entries[i] for i in program["outputs"]]
+
+
+def outside(form: Form) -> bool:
+    """Whether a form is of what comes from outside alone, a disturbance: it then scales the other factor."""
+    return all(symbol[:2] in ("", "d:", "w:") for symbol in form)
 
 
 def derivative(program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[str, Form]) -> Form:
@@ -1033,7 +1038,8 @@ STUDY = entry_of(
             {"level": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
         ),
         "uncertainty": entry_of({
-            "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit}), 8),
+            "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit},
+                                           {"rate": positive}), 8),
             "noise": named(plain_number), "initial": named(plain_number),
         }),
         "reference": entry_of(
@@ -1045,7 +1051,7 @@ STUDY = entry_of(
         ),
         "controller": entry_of(
             {"law": text, "modelling": listed(some(*MODELLING), 0, 8), "rate_hz": plain_number,
-             "rates_hz": named(plain_number),
+             "rates_hz": named(plain_number), "delay_s": share,
              "gains": NOTHING, "members": named(named(RANGE))},
             {"observer": entry_of(dict.fromkeys(("bandwidth_rad_s", "largest", "epsilon", "sigma"), plain_number))},
         ),
@@ -1068,12 +1074,15 @@ PROGRAM = entry_of({"inputs": listed(text, 0, 200), "operations": listed(operati
                     "outputs": listed(whole, 1, 64)})  # fmt: skip
 EXACT = listed(ratio, 1, MAX_ROWS)
 CERTIFICATE = entry_of(
-    {"kind": text, "decay": ratio, "half_widths": EXACT, "input_bound": EXACT,
+    {"kind": text, "half_widths": EXACT, "input_bound": EXACT,
+     "networks": listed(entry_of(dict.fromkeys(("row", "low", "high", "middle", "bound"), ratio) | {"row": name}),
+                        0, MAX_ROWS),
+     "force": listed(EXACT, 1, MAX_ROWS), "drive": listed(EXACT, 1, MAX_ROWS), "split": listed(whole, 1, MAX_ROWS),
+     "cells": listed(entry_of({"columns": listed(listed(ratio, 1, MAX_ORDER), 1, MAX_ORDER),
+                               "blocks": listed(whole, 1, MAX_ORDER), "groups": listed(whole, 1, MAX_GROUPS),
+                               "growth": ratio}), 1, MAX_CELLS),
      "envelope": entry_of({"rate": ratio, "ultimate": EXACT})},
-    {"guarantee": listed(ratio, 3, 3), "weights": EXACT, "young": EXACT, "leak": EXACT,
-     "split": listed(whole, 1, MAX_ROWS),
-     "cells": listed(entry_of({"transform": listed(EXACT, 1, MAX_ROWS), "reach": EXACT, "start": EXACT,
-                               "shape": EXACT}), 1, MAX_CELLS)},
+    {"guarantee": listed(ratio, 3, 3)},
 )  # fmt: skip
 MEMBER = entry_of(
     {
@@ -1099,7 +1108,7 @@ MEMBER = entry_of(
         }),
         "certificate": CERTIFICATE,
         "golden": listed(entry_of(
-            {key: listed(plain_number, 1, MAX_ROWS) for key in ("x", "r", "theta", "u", "theta_next")},
+            dict.fromkeys(("x", "r", "theta", "phi", "u", "theta_next", "phi_next"), listed(plain_number, 1, MAX_ROWS)),
             {"load": listed(plain_number, 1, 1)}), 20, 100),
     },
     {"observer": entry_of({"first": plain_number, "second": plain_number, "pole": plain_number})},
@@ -1151,22 +1160,25 @@ def shaped(data: dict[str, Any]) -> None:
 
 @dataclass(frozen=True)
 class Gain:
-    """Gains of one controlled row, as intervals."""
+    """Gains of one controlled row, as intervals; what bounds and starts its load network, as numbers."""
 
     beta: Interval
     epsilon: Interval
     delta: Interval
     sigma: Interval
+    gamma: Interval
+    capacity: Fraction
+    preload: Fraction
 
 
 @dataclass(frozen=True)
 class Cell:
-    """W, R, P and s of a sampled certificate for a part of the inertias' ranges."""
+    """What a file says of the loop for a part of the inertias' ranges: coordinates, groups of periods, weight."""
 
-    transform: list[list[Fraction]]
-    reach: list[Fraction]
-    start: list[Fraction]
-    shape: list[Fraction]
+    columns: list[list[Fraction]]
+    blocks: list[int]
+    groups: list[int]
+    growth: Fraction
 
 
 @dataclass(frozen=True)
@@ -1186,14 +1198,17 @@ class Claim:
     noise: list[Fraction]
     initial: list[Fraction]
     period: Fraction
+    delay: Fraction
     gains: list[tuple[Fraction, ...]]
-    kind: str
-    decay: Fraction
-    vectors: dict[str, list[Fraction]]
+    force: list[list[Fraction]]
+    drive: list[list[Fraction]]
     split: list[int]
     cells: list[Cell]
     half_widths: list[Fraction]
     input_bound: list[Fraction]
+    demand: list[Interval]
+    middle: list[Fraction]
+    network_bound: list[Fraction]
     ultimate: list[Fraction]
     limits: list[dict[str, Any]]
     stroke: Interval
@@ -1201,6 +1216,7 @@ class Claim:
     transient: Fraction
     feedforward: dict[str, tuple[Interval, Interval]] = field(default_factory=dict)
     first: str = "position"
+    rest: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0))
 
     @property
     def controlled(self) -> list[int]:
@@ -1208,28 +1224,37 @@ class Claim:
         return [i for i, row in enumerate(self.rows) if row["controlled"]]
 
     @property
-    def weights(self) -> list[Fraction]:
-        """Weights w of a composition."""
-        return self.vectors["weights"]
+    def networks(self) -> list[int]:
+        """Indices of the rows with a load network."""
+        return [i for i, gain in zip(self.controlled, self.gains, strict=True) if gain[4] > 0]
 
     @property
-    def young(self) -> list[Fraction]:
-        """Young's ν of a composition."""
-        return self.vectors["young"]
+    def whole(self) -> int:
+        """Whole periods of the computing delay."""
+        return int(self.delay / self.period)
 
     @property
-    def leak(self) -> list[Fraction]:
-        """The p = ε θ* of a composition."""
-        return self.vectors["leak"]
+    def share(self) -> Fraction:
+        """The rest of the delay as a share of the period."""
+        return self.delay / self.period - self.whole
+
+    @property
+    def pending(self) -> int:
+        """Samples whose inputs are still to act."""
+        return self.whole + (self.share > 0)
 
 
-def cell_of(entry: dict[str, Any], count: int) -> Cell:
-    """One cell of a sampled certificate."""
-    rows = entry["transform"]
-    need(isinstance(rows, list) and len(rows) == count, f"a transform must have {count} rows")
-    vectors = [numbers(entry[name], count, name) for name in VECTORS["sampled"]]
-    transform = [numbers(row, count, "a transform") for row in rows]
-    return Cell(transform, *vectors)
+def cell_of(entry: dict[str, Any]) -> Cell:
+    """One cell of a certificate; how large it must be is decided where the loop is built."""
+    columns = entry["columns"]
+    need(isinstance(columns, list) and 1 <= len(columns) <= MAX_ORDER, f"coordinates are of 1 to {MAX_ORDER} states")
+    blocks = [index(v, 3, "a block") for v in entry["blocks"]]
+    need(min(blocks) >= 1 and sum(blocks) == len(columns), "the blocks do not cover the coordinates")
+    groups = [index(v, MAX_GROUP + 1, "a group of periods") for v in entry["groups"]]
+    need(1 <= len(groups) <= MAX_GROUPS and min(groups) >= 1, f"1 to {MAX_GROUPS} groups of periods are summed")
+    growth = number(entry["growth"], "growth")
+    need(growth >= 1, "the weight of a period is 1 or more")
+    return Cell([numbers(row, len(columns), "coordinates") for row in columns], blocks, groups, growth)
 
 
 # --- reference ---
@@ -1311,7 +1336,8 @@ def blossom(knots: list[Fraction], points: list[Fraction], span: int, arguments:
 #: Meaning of a gain by its kind.
 MEANINGS = {
     "beta": "proportional gain", "epsilon": "adaptation gain", "delta": "adaptation rate",
-    "sigma": "leakage of the adaptation",
+    "sigma": "leakage of the adaptation", "gamma": "gain of the load network",
+    "phi": "largest estimate of the load network", "preload": "estimate of the load network at the start",
 }  # fmt: skip
 #: Key of a stroke by the unit of the first state.
 STROKE = {"m": "stroke_m", "rad": "stroke_rad", "m/s": "stroke_m_s", "rad/s": "stroke_rad_s"}
@@ -1411,8 +1437,10 @@ def _gains(entry: dict[str, Any], claim: Claim, units: dict[str, str]) -> None:
         row = claim.controlled[int(place) - 1]
         state = claim.rows[row]["state"]
         following = [units[r["state"]] for r in claim.rows if r["target"] == row]
-        ratio = f"({following[0] if following else claim.limits[0]['unit']})/({units[state]})"
-        unit = {"beta": ratio, "epsilon": f"sqrt({ratio}/s)/({units[state]})", "delta": "1", "sigma": "1/s"}[kind]
+        control = following[0] if following else claim.limits[0]["unit"]
+        ratio = f"({control})/({units[state]})"
+        unit = {"beta": ratio, "epsilon": f"sqrt({ratio}/s)/({units[state]})", "delta": "1", "sigma": "1/s",
+                "gamma": f"{ratio}/s", "phi": control, "preload": control}[kind]  # fmt: skip
         need(gain["unit"] == unit, f"{gain['name']} must be in {unit}")
         need(
             gain["meaning"] == f"{MEANINGS[kind]} of subsystem {place} ({state})",
@@ -1590,7 +1618,7 @@ def different(vectors: list[dict[str, Any]], claim: Claim) -> None:
     """Refuse golden vectors that repeat each other in what the law reads, or that never move a result."""
     named = {name for term in claim.law for name in reads(term)} | {"r0"}
     kept = [k for k in range(4) if f"r{k}" in named]
-    seen = {(tuple(v["x"]), tuple(v["r"][k] for k in kept), tuple(v["theta"])) for v in vectors}
+    seen = {(tuple(v["x"]), tuple(v["r"][k] for k in kept), tuple(v["theta"]), tuple(v["phi"])) for v in vectors}
     need(len(seen) == len(vectors), "golden vectors must differ in what the law reads")
     need(len({tuple(v["u"]) for v in vectors}) > len(vectors) // 2, "golden vectors must move the input")
 
@@ -1727,10 +1755,16 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     rate = number(controller.get("rates_hz", {}).get(entry["name"], controller["rate_hz"]), "rate_hz")
     transient = number(study["validation"]["transient_s"], "transient_s")
     need(rate > 0 and transient >= 0, "the control rate must be positive, the transient not negative")
-    split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]] if kind == "sampled" else []
-    cells = [cell_of(cell, n) for cell in certificate["cells"]] if kind == "sampled" else []
+    split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]]
+    cells = [cell_of(cell) for cell in certificate["cells"]]
     covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod(split)
-    need(kind != "sampled" or covered, "the cells do not cover the inertias")
+    need(covered, "the cells do not cover the inertias")
+    gains = gains_of(entry["gains"], controlled, study, entry["name"])
+    own = [states[i] for i, gain in zip(controlled, gains, strict=True) if gain[4] > 0]
+    networks = certificate["networks"]
+    need([given["row"] for given in networks] == own, "the networks are not those of the gains")
+    delay = number(controller["delay_s"], "delay_s")
+    need(delay * rate <= MAX_DELAY, f"a computing delay is of at most {MAX_DELAY} periods")
     stroke = numbers(stroke_of(section, str(rows[0]["unit"])), 2, "stroke")
     return Claim(
         name=entry["name"], rows=rows, input_map=input_map, inputs=model["inputs"], plant=plant, law=terms,
@@ -1738,17 +1772,34 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
         reference=reference_bounds(entry["reference"]),
         noise=[magnitude(assumed["noise"][s]) for s in states],
         initial=[magnitude(assumed["initial"][s]) for s in states],
-        period=1 / rate, gains=gains_of(entry["gains"], controlled, study, entry["name"]), kind=kind,
-        decay=number(certificate["decay"], "decay"),
-        vectors={name: numbers(certificate[name], n, name) for name in VECTORS[kind] if kind == "composition"},
-        split=split, cells=cells, half_widths=numbers(certificate["half_widths"], n, "half_widths"),
+        period=1 / rate, delay=delay, gains=gains, split=split, cells=cells,
+        force=[numbers(row, n, "force") for row in listed_of(certificate["force"], n, "force")],
+        drive=[numbers(row, m, "drive") for row in listed_of(certificate["drive"], n, "drive")],
+        half_widths=numbers(certificate["half_widths"], n, "half_widths"),
         input_bound=numbers(certificate["input_bound"], m, "input_bound"),
+        demand=[(number(given["low"], "low"), number(given["high"], "high")) for given in networks],
+        middle=[number(given["middle"], "middle") for given in networks],
+        network_bound=[number(given["bound"], "bound") for given in networks],
         ultimate=numbers(certificate["envelope"]["ultimate"], n, "ultimate"),
         limits=limits, stroke=(stroke[0], stroke[1]), accuracy=accuracy_of(study, entry["name"]),
         transient=transient,
         feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
-        first=model["first"],
+        first=model["first"], rest=rest_of(entry["reference"]["segments"], study["reference"]["dwell_s"]),
     )  # fmt: skip
+
+
+def rest_of(segments: list[dict[str, Any]], pause: Any) -> tuple[Fraction, Fraction]:
+    """Where the reference rests at first and for how long; that it does, `course.follows` decides."""
+    if not number(pause, "dwell_s") > 0:
+        return Fraction(0), Fraction(0)
+    knots = [number(v, "a knot") for v in segments[0]["knots"]]
+    return number(segments[0]["coefficients"][0], "a coefficient"), knots[-1] - knots[0]
+
+
+def listed_of(value: Any, count: int, what: str) -> list[Any]:
+    """A list of a given length."""
+    need(isinstance(value, list) and len(value) == count, f"{what} must have {count} rows")
+    return value
 
 
 def rows_of(model: dict[str, Any]) -> tuple[list[dict[str, Any]], list[int], list[int]]:
@@ -1794,7 +1845,6 @@ def check_names(
 ) -> None:  # fmt: skip
     """Refuse a model that reads what has no assumption, or a law that reads what a controller cannot know."""
     parameters = assumed["parameter"]
-    need(not set(nominal) & set(assumed["feedforward"]), "a foreseen disturbance has no nominal value")
     inertias = reads(plant, plant["outputs"][: len(states)])
     need(inertias <= set(parameters) - {"effectiveness"}, "an inertia depends on more than constant parameters")
     listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], "r0", "r1", "r2", "r3"]
@@ -1813,13 +1863,15 @@ def check_names(
 def gains_of(
     entries: list[dict[str, Any]], controlled: list[int], study: dict[str, Any], name: str
 ) -> list[tuple[Fraction, ...]]:
-    """β, ε, δ, σ of each controlled row, inside the ranges of the file and of the study."""
-    kinds = ("beta", "epsilon", "delta", "sigma")
+    """β, ε, δ, σ, γ, Φ, φ̂(0) of each controlled row, inside the ranges of the file and of the study."""
+    kinds = ("beta", "epsilon", "delta", "sigma", "gamma", "phi", "preload")
     given = {entry["name"]: number(entry["value"], entry["name"]) for entry in entries}
     names = [f"{kind}_{k + 1}" for k in range(len(controlled)) for kind in kinds]
     need(set(given) == set(names) and len(entries) == len(names), "the gains do not fit the subsystems")
     gains = [tuple(given[f"{kind}_{k + 1}"] for kind in kinds) for k in range(len(controlled))]
-    need(all(b > 0 and e >= 0 and d > 0 and s > 0 for b, e, d, s in gains), "gains must be positive")
+    good = all(b > 0 and e >= 0 and d > 0 and s > 0 and g >= 0 and phi >= abs(p) * (g > 0) >= 0
+               for b, e, d, s, g, phi, p in gains)  # fmt: skip
+    need(good, "gains must be positive, and a preload inside phi")
     ranges = study["controller"]["members"][name]
     need(set(ranges) == set(names), f"the ranges of the gains of {name} are not those of its gains")
     fixed = all(set(r) in ({"value"}, {"min", "max"}) for r in ranges.values())
@@ -1860,7 +1912,7 @@ def assumptions(
     )
     foreseen = set(found["feedforward"])
     need(foreseen == set(found["feedforward_rate"]), "a foreseen disturbance needs a range and a range of its rate")
-    need(foreseen <= (set(found["disturbance"]) if coupled else set()), "only the load of a coupling is foreseen")
+    need(foreseen <= set(found["disturbance"]), "what has a rate must be a disturbance")
     stated = stated_ranges(study, section, states, coupled)
     carried = {name for name in found["parameter"] if coupled and name in CARRIED}
     listed = {name for kind, name, _, _ in stated if kind == "parameter"}
@@ -1875,6 +1927,8 @@ def assumptions(
     if not coupled:
         disturbed = {name for kind, name, _, _ in stated if kind == "disturbance"}
         need(disturbed == set(found["disturbance"]), "the disturbances are not those of the study")
+        rated = {name for kind, name, _, _ in stated if kind == "feedforward"}
+        need(rated == foreseen, "the disturbances with a rate are not those of the study")
     return found
 
 
@@ -1893,7 +1947,13 @@ def stated_ranges(
         stated.append(("parameter", "effectiveness", least, Fraction(1)))
     for name, entry in {} if coupled else uncertainty["disturbances"].items():
         low, high = numbers(entry["range"], 2, name)
-        stated.append(("disturbance", name, low, high))
+        if "rate" not in entry:
+            stated.append(("disturbance", name, low, high))
+            continue
+        rate = number(entry["rate"], f"the rate of {name}")
+        need(rate > 0, f"the rate of {name} must be positive")
+        stated += [("disturbance", name, Fraction(0), Fraction(0)), ("feedforward", name, low, high),
+                   ("feedforward_rate", name, -rate, rate)]  # fmt: skip
     observed = study["controller"].get("observer") is not None
     for kind in ("noise", "initial"):
         given = uncertainty.get(kind, {})
@@ -1915,39 +1975,46 @@ def printable(unit: Any) -> bool:
 # --- loop ---
 
 class Loop:
-    """M_i Q_i' = sum_j S_ij Q_j + d_i over the assumed box, with every entry an interval."""
+    """M_i z_i' = sum_j J_ij z_j + sum_k B_ik v_k + d_i + M_i φ*_j' around the operating point x*(t).
 
-    moving = "Q"
+    The symbols Q are the deviations z = x - x*, the symbols e the inputs v, the symbols p the demands φ* of the load
+    networks. x* follows from the reference and the demands: the term of a tracked row must not read a state.
+    """
 
     def __init__(self, claim: Claim, inflate: Fraction) -> None:
+        tracked = {row["target"] for row in claim.rows}
+        states = {row["state"] for row in claim.rows}
+        for i, term in zip(claim.controlled, claim.law, strict=True):
+            need(i not in tracked or not states & reads(term), "the modelling term of a tracked row reads a state")
         self.claim, self.table = claim, Table()
         self.gain: dict[int, Gain] = {}
         for i, values in zip(claim.controlled, claim.gains, strict=True):
-            self.gain[i] = Gain(*((v * (1 - inflate), v * (1 + inflate)) for v in values))
+            wide = [(v * (1 - inflate), v * (1 + inflate)) for v in values[:5]]
+            self.gain[i] = Gain(*wide, capacity=values[5], preload=values[6])
         self.term = dict(zip(claim.controlled, claim.law, strict=True))
-        self.theta: dict[int, Fraction] = {}
-        self.theta_rate: dict[int, Fraction] = {}
         self.half: dict[int, Interval] = {}
-        self.noise: dict[int, Fraction] = {}
         self.model: dict[int, Form] = {}
         self.nodes: dict[str, Node] = {}
-        self.virtual: dict[int, Form] = {}
         self._inputs()
         self._rows()
 
     def _inputs(self) -> None:
         claim, table = self.claim, self.table
         fixed = {f"nominal.{name}": (value, value) for name, value in claim.nominal.items()}
-        for name, bounds in {**fixed, **claim.parameters, **claim.disturbances}.items():
-            key = ("const", bounds[0]) if bounds[0] == bounds[1] else ("input", name)
-            self.nodes[name] = Node(table.key(*key), {"": bounds}, bounds)
+        for name, bounds in {**fixed, **claim.parameters}.items():
+            self._stated(name, bounds, changing=name == VARYING)
+        for name, bounds in claim.disturbances.items():
+            self._stated(name, bounds, changing=True)
         for name, (bounds, _) in claim.feedforward.items():
             table.ranges[f"w:{name}"] = bounds
-            self._name(f"nominal.{name}", {f"w:{name}": ONE})
-            self._name(name, {f"w:{name}": ONE, "": claim.disturbances[name]})
+            if name not in claim.nominal:
+                self._name(f"nominal.{name}", {f"w:{name}": ONE})
+            self._name(name, plus({f"w:{name}": ONE}, self.nodes[name].form))
         for k, bounds in enumerate(claim.reference):
             table.ranges[f"r{k}"] = bounds
             self._name(f"r{k}", {f"r{k}": ONE})
+        for i, bounds in zip(claim.networks, claim.demand, strict=True):
+            table.ranges[f"p{i}"] = bounds
         for i, radius in enumerate(claim.half_widths):
             table.ranges[f"Q{i}"] = symmetric(radius)
         for k, error in enumerate(claim.input_bound):
@@ -1962,6 +2029,16 @@ class Loop:
     def _name(self, name: str, form: Form) -> None:
         self.nodes[name] = Node(self.table.key("input", name), form, self.table.over(form))
 
+    def _stated(self, name: str, bounds: Interval, *, changing: bool) -> None:
+        """What may change at any time is a symbol of its own, so that the coefficients of others are constant."""
+        if bounds[0] == bounds[1]:
+            self.nodes[name] = Node(self.table.key("const", bounds[0]), {"": bounds}, bounds)
+        elif changing:
+            self.table.ranges[f"d:{name}"] = bounds
+            self._name(name, {f"d:{name}": ONE})
+        else:
+            self.nodes[name] = Node(self.table.key("input", name), {"": bounds}, bounds)
+
     def _target(self, i: int) -> Form:
         target = self.claim.rows[i]["target"]
         if target == "reference":
@@ -1969,39 +2046,39 @@ class Loop:
         return {} if target == "zero" else self._kappa(target)
 
     def _kappa(self, i: int) -> Form:
+        """The operating value of row i's control: m_i, less φ*_i where it has a network."""
         self._control(i)
-        return plus({f"K{i}": ONE}, self.model[i])
+        return plus(self.model[i], {f"p{i}": neg(ONE)}) if i in self.claim.networks else self.model[i]
 
     def _control(self, i: int) -> None:
-        """θ̂_i in [0, ε(R+N)²/(2σ)], the gain in [½β, ½B], the modelling term."""
+        """θ̂_i in [0, ε(R+N)²/(2σ)], the gain b in [½β, ½B], the modelling term."""
         if i in self.half:
             return
-        gain, noise = self.gain[i], self._noise(i)
-        peak = (self._error(i) + noise) ** 2
-        theta = up(gain.epsilon[1] * peak / (2 * gain.sigma[0]))
-        drive = max(gain.delta[1] * gain.sigma[1] * theta, gain.epsilon[1] * gain.delta[1] * peak / 2)
-        self.theta[i], self.theta_rate[i] = theta, up(drive)
+        gain = self.gain[i]
+        theta = up(gain.epsilon[1] * (self._error(i) + self.noise(i)) ** 2 / (2 * gain.sigma[0]))
         self.half[i] = down(gain.beta[0] / 2), up((gain.beta[1] + gain.epsilon[1] * theta) / 2)
-        self.table.definitions[f"K{i}"] = {f"Q{i}": neg(self.half[i])}
-        self.table.ranges[f"K{i}"] = self.table.over(self.table.definitions[f"K{i}"])
         need(reads(self.term[i]) <= set(self.nodes), "a modelling term reads a state that comes later")
         self.model[i] = linear(self.term[i], self.nodes, self.table)[0].form
 
     def _error(self, i: int) -> Fraction:
-        """Bound on |Q_i|."""
-        return self.claim.half_widths[i]
+        """Bound on |Q_i|: z_i, what its target asks for, and what its network misses."""
+        claim, target = self.claim, self.claim.rows[i]["target"]
+        if isinstance(target, str):
+            return claim.half_widths[i]
+        missed = claim.network_bound[claim.networks.index(target)] if target in claim.networks else Fraction(0)
+        return claim.half_widths[i] + self.half[target][1] * self._error(target) + missed
 
-    def _noise(self, i: int) -> Fraction:
+    def noise(self, i: int) -> Fraction:
+        """Bound on the error of the Q_i that the controller computes."""
         target, own = self.claim.rows[i]["target"], self.claim.noise[i]
-        upstream = Fraction(0) if isinstance(target, str) else self._control_noise(target)
-        self.noise[i] = own + upstream
-        return self.noise[i]
+        if isinstance(target, str):
+            return own
+        return own + up(self.half[target][1] * self.noise(target) + self.term_noise(target))
 
-    def _control_noise(self, i: int) -> Fraction:
-        """What measurement errors make of κ_i."""
+    def term_noise(self, i: int) -> Fraction:
+        """What measurement errors make of a modelling term."""
         shaken = {r["state"]: {"": symmetric(n)} for r, n in zip(self.claim.rows, self.claim.noise, strict=True)}
-        direct = magnitude(derivative(self.term[i], self._ranges(), shaken).get("", ZERO))
-        return up(self.half[i][1] * self.noise[i] + direct)
+        return magnitude(derivative(self.term[i], self._ranges(), shaken).get("", ZERO))
 
     def _ranges(self) -> dict[str, Interval]:
         ranges = {name: node.range for name, node in self.nodes.items()}
@@ -2016,116 +2093,114 @@ class Loop:
         self.mass = [value.range for value in values[:n]]
         if min(mass[0] for mass in self.mass) <= 0:
             raise NotProvedError("an inertia can vanish inside the assumptions")
-        forces = [table.expand(value.form, keep="K") for value in values[n:]]
+        raw = [value.form for value in values[n:]]
+        forces = [table.expand(form) for form in raw]
         moving = {r["state"]: times(f, inverse(m)) for r, f, m in zip(claim.rows, forces, self.mass, strict=True)}
         moving |= {f"r{k}": {f"r{k + 1}": ONE} for k in range(3)}
         moving |= {f"nominal.{name}": {"": rate} for name, (_, rate) in claim.feedforward.items()}
-        self.open: list[Form] = []
+        self.virtual: dict[int, Form] = {}
+        self.closed: list[Form] = []
+        self.disturbance: list[Fraction] = []
+        self.demand: list[Interval] = []
+        self.demand_rate: list[Fraction] = []
+        self.settled: list[Fraction] = []
+        places = [claim.rest[0], Fraction(0), Fraction(0), Fraction(0)]
+        self.resting: dict[str, Interval] = {f"r{k}": (place, place) for k, place in enumerate(places)}
         for i, row in enumerate(claim.rows):
             rate = {"r1": ONE} if row["target"] == "reference" else {}
             rate = self.virtual[row["target"]] if isinstance(row["target"], int) else rate
-            self.open.append(plus(forces[i], times(rate, neg(self.mass[i]))))
+            self.closed.append(plus(forces[i], times(rate, neg(self.mass[i]))))
             if i in self.gain:
-                self.virtual[i] = self._virtual_rate(i, moving)
-        self.closed = [table.expand(form) for form in self.open]
-        rest = [{s: c for s, c in f.items() if s[:1] not in self.moving or not s} for f in self.closed]
-        self.disturbance = [magnitude(table.over(form)) for form in rest]
+                self.virtual[i] = table.expand(derivative(self.term[i], self._ranges(), moving))
+            if i in claim.networks:
+                self.disturbance.append(self._demanded(i, raw[i], rate))
+            else:
+                self.disturbance.append(magnitude(self._left(self.closed[i])))
 
-    def _virtual_rate(self, i: int, moving: dict[str, Form]) -> Form:
-        """κ_i' = -½(β + εθ̂) Q_i' - ½ε θ̂' Q_i + m_i'."""
-        error_rate = times(self.open[i], inverse(self.mass[i]))
-        adapting = symmetric(up(self.gain[i].epsilon[1] * self.theta_rate[i] / 2))
-        term_rate = self.table.expand(derivative(self.term[i], self._ranges(), moving), keep="K")
-        return plus(times(error_rate, neg(self.half[i])), {f"Q{i}": adapting}, term_rate)
+    def _left(self, form: Form) -> Interval:
+        """Range of what is neither a deviation nor an input."""
+        return self.table.over({s: c for s, c in form.items() if s[:1] not in ("Q", "e")})
+
+    def _demanded(self, i: int, raw: Form, rate: Form) -> Fraction:
+        """What φ*_i meets of row i, and how fast; returns the disturbance that is left.
+
+        Only constant coefficients count: those of the force before nonlinear operations are replaced by what bounds
+        them, and those of the target's rate that are numbers.
+        """
+        claim, table = self.claim, self.table
+        place = claim.networks.index(i)
+        changes = {f"r{k}": claim.reference[k + 1] for k in range(3)}
+        changes |= {f"w:{name}": change for name, (_, change) in claim.feedforward.items()}
+        shift = {s: c for s, c in rate.items() if s in changes and c[0] == c[1]}
+        met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[i])))
+        middle = {"": (claim.middle[place], claim.middle[place])}
+        level = table.over(plus(met, middle))
+        change = max((abs(end) for end in table_sum(met, changes)), default=Fraction(0))
+        drive, constant = neg(raw.get(f"p{i}", ZERO)), True
+        if not drive[0] > 0:
+            drive, constant = neg(self.closed[i].get(f"p{i}", ZERO)), False
+        if not drive[0] > 0:
+            raise NotProvedError(f"the load network of row {i + 1} has no effect of a known sign")
+        known = {*changes, f"p{i}"} if constant else {*changes}
+        rest = table.expand({s: c for s, c in raw.items() if s not in known})
+        late = {s: c for s, c in rate.items() if s not in shift}
+        rest = plus(rest, times(late, neg(self.mass[i])), times(middle, neg(ONE)))
+        least = drive[0]
+        if not constant:  # where the effect of φ̂ may change, φ* is for its middle
+            centre = down((drive[0] + drive[1]) / 2)
+            around = max(drive[1] - centre, centre - drive[0])
+            drive = centre, centre
+            rest = plus({s: c for s, c in rest.items() if s != f"p{i}"},
+                        {"": symmetric(around * magnitude(mul(level, inverse(drive))))})  # fmt: skip
+        left = magnitude(self._left(rest))
+        self.demand.append(mul(level, inverse(drive)))
+        still = table_sum(plus(met, middle), {**table.ranges, **self.resting})
+        self.resting[f"p{i}"] = mul(still, inverse(drive))
+        self.demand_rate.append(up(change / drive[0]))
+        self.settled.append(up(left / least))
+        return left
 
     def entry(self, i: int, j: int) -> Interval:
-        """S_ij."""
+        """J_ij."""
         return self.closed[i].get(f"Q{j}", ZERO)
 
-    def own_gain(self, i: int) -> Fraction:
-        """The smallest effect of the own virtual control."""
-        return self.open[i].get(f"K{i}", ZERO)[0]
-
-    def input_error(self, k: int) -> Fraction:
-        """T_s sup|κ'| plus what noise adds: bounds |u_k - κ_k(t)| within a period."""
-        row = self.claim.input_map[k]
-        speed = magnitude(self.table.over(self.table.expand(self.virtual[row])))
-        return self.claim.period * speed + self._control_noise(row)
+    def late(self, k: int) -> Fraction:
+        """What the modelling term of input k changes until it acts."""
+        change = magnitude(self.table.over(self.virtual[self.claim.input_map[k]]))
+        return (self.claim.period + self.claim.delay) * change
 
     def signal(self, name: str) -> Fraction:
         """Bound on |input| as commanded, or on |state|."""
         if name not in self.claim.inputs:
             return magnitude(self.nodes[name].range)
-        row = self.claim.input_map[self.claim.inputs.index(name)]
-        return magnitude(self.table.over(self._kappa(row))) + self._beyond(row)
+        k = self.claim.inputs.index(name)
+        return magnitude(self.table.over(self._kappa(self.claim.input_map[k]))) + self.claim.input_bound[k]
 
-    def _beyond(self, row: int) -> Fraction:
-        """What a commanded input may be more than its form says."""
-        return self._control_noise(row)
+    def size(self, name: str, deviations: list[Fraction], *, resting: bool) -> Fraction:
+        """Bound on |input| as commanded, or on |state|, for bounds on |z| and |v|, in motion or at rest at first."""
+        claim, n = self.claim, len(self.claim.rows)
+        known = {**self.table.ranges, **(self.resting if resting else {})}
+        known |= {f"Q{i}": symmetric(r) for i, r in enumerate(deviations[:n])}
+        if name in claim.inputs:
+            k = claim.inputs.index(name)
+            return magnitude(table_sum(self._kappa(claim.input_map[k]), known)) + deviations[n + k]
+        i = next(i for i, row in enumerate(claim.rows) if row["state"] == name)
+        return magnitude(table_sum(self._target(i), known)) + deviations[i]
 
-    def adaptation_residual(self, i: int) -> Fraction:
-        """What sampling and noise add to θ̂' in the Lyapunov function."""
-        gain, period = self.gain[i], self.claim.period
-        error = period * magnitude(self.table.over(self.closed[i])) / self.mass[i][0] + self.noise[i]
-        squares = gain.epsilon[1] * gain.delta[1] * error * (2 * self.claim.half_widths[i] + error) / 2
-        return up(gain.delta[1] * gain.sigma[1] * period * self.theta_rate[i] + squares)
 
-
-# --- deviation ---
-
-class Deviation(Loop):
-    """M_i z_i' = sum_j J_ij z_j + sum_k B_ik e_k + d_i around the operating point x*(t).
-
-    The symbols Q are the deviations z = x - x*; the symbols e are u - m(x(t), r(t)) = -K z(t_k) + noise + drift, all of
-    it inside the bounds `input_bound`. x* follows from the reference: the term of a tracked row must not read a state.
-    """
-
-    moving = "Qe"
-
-    def __init__(self, claim: Claim, inflate: Fraction) -> None:
-        tracked = {row["target"] for row in claim.rows}
-        states = {row["state"] for row in claim.rows}
-        for i, term in zip(claim.controlled, claim.law, strict=True):
-            need(i not in tracked or not states & reads(term), "the modelling term of a tracked row reads a state")
-        super().__init__(claim, inflate)
-
-    def _error(self, i: int) -> Fraction:
-        target = self.claim.rows[i]["target"]
-        upstream = Fraction(0) if isinstance(target, str) else self.half[target][1] * self._error(target)
-        return self.claim.half_widths[i] + upstream
-
-    def _kappa(self, i: int) -> Form:
-        self._control(i)
-        return self.model[i]
-
-    def _virtual_rate(self, i: int, moving: dict[str, Form]) -> Form:
-        return self.table.expand(derivative(self.term[i], self._ranges(), moving))
-
-    def _beyond(self, row: int) -> Fraction:
-        return self.claim.input_bound[self.claim.input_map.index(row)]
-
-    def feedback(self, k: int) -> list[Interval]:
-        """K of input k: b_i Q_i, where Q_i = z_i + b_t Q_t."""
-        row = self.claim.input_map[k]
-        factor, found = self.half[row], [ZERO] * len(self.claim.rows)
-        found[row] = factor
-        while not isinstance(self.claim.rows[row]["target"], str):
-            row = self.claim.rows[row]["target"]
-            factor = found[row] = mul(factor, self.half[row])
-        return found
-
-    def drift(self, k: int) -> Fraction:
-        """Bound on |d m_k(x(t), r(t)) / dt|."""
-        return magnitude(self.table.over(self.virtual[self.claim.input_map[k]]))
-
-    def noise_of(self, k: int) -> Fraction:
-        """What measurement errors make of input k."""
-        return self._control_noise(self.claim.input_map[k])
+def table_sum(form: Form, ranges: dict[str, Interval]) -> Interval:
+    """Range of a form over given ranges of its symbols."""
+    total = ZERO
+    for symbol, value in form.items():
+        total = add(total, mul(value, ranges[symbol]))
+    return total
 
 
 # --- matrices ---
 
 Matrix = list[list[Fraction]]
+#: Whole numbers in units of 2^-FIXED.
+Whole = list[list[int]]
 
 
 def dot(row: Iterable[Fraction], column: Iterable[Fraction]) -> Fraction:
@@ -2133,34 +2208,9 @@ def dot(row: Iterable[Fraction], column: Iterable[Fraction]) -> Fraction:
     return sum((a * b for a, b in zip(row, column, strict=True) if a and b), Fraction(0))
 
 
-def product_of(*factors: Matrix) -> Matrix:
-    """Matrix product."""
-    result = factors[0]
-    for factor in factors[1:]:
-        columns = list(zip(*factor, strict=True))
-        result = [[dot(row, column) for column in columns] for row in result]
-    return result
-
-
 def identity(count: int) -> Matrix:
     """Unit matrix."""
     return [[Fraction(int(i == j)) for j in range(count)] for i in range(count)]
-
-
-def negative(matrix: Matrix) -> Matrix:
-    """Entries with the other sign."""
-    return [[-value for value in row] for row in matrix]
-
-
-def sum_of(*matrices: Matrix) -> Matrix:
-    """Matrix sum."""
-    pairs = zip(*matrices, strict=True)
-    return [[sum(values, Fraction(0)) for values in zip(*rows, strict=True)] for rows in pairs]
-
-
-def absolute(matrix: Matrix) -> Matrix:
-    """Entries without sign."""
-    return [[abs(value) for value in row] for row in matrix]
 
 
 def inverse_of(matrix: Matrix) -> Matrix:
@@ -2170,252 +2220,660 @@ def inverse_of(matrix: Matrix) -> Matrix:
     for i in range(n):
         pivot = next((k for k in range(i, n) if work[k][i] != 0), None)
         if pivot is None:
-            raise NotProvedError("the transform of the certificate is singular")
+            raise NotProvedError("the coordinates of the certificate are singular")
         work[i], work[pivot] = work[pivot], work[i]
         work[i] = [value / work[i][i] for value in work[i]]
         for k in range(n):
             if k != i and work[k][i] != 0:
-                work[k] = [a - work[k][i] * b for a, b in zip(work[k], work[i], strict=True)]
+                factor = work[k][i]
+                work[k] = [a - factor * b for a, b in zip(work[k], work[i], strict=True)]
     return [row[n:] for row in work]
 
 
-def exponential_times(matrix: Matrix, columns: Matrix) -> Matrix:
-    """exp(matrix) · columns in fixed point; every entry within FIXED_ERROR where the columns have entries below 2^8.
+@dataclass(frozen=True)
+class Ball:
+    """A matrix in units of 2^-FIXED, every entry within `error` of what it stands for."""
 
-    The remainder of the series is below 20^121/121! < 2^-140; rounding, by truncation at 2^-192 in each of 120 terms of
-    at most 300 products, grows by no more than exp(20) < 2^29.
+    rows: Whole
+    error: int
+
+    def __matmul__(self, other: Ball) -> Ball:
+        columns = list(zip(*other.rows, strict=True))
+        rows = [[sum(map(operator.mul, row, column)) >> FIXED for column in columns] for row in self.rows]
+        size = max((sum(map(abs, row)) for row in self.rows), default=0)
+        other_size = max((sum(map(abs, column)) for column in columns), default=0)
+        error = size * other.error + other_size * self.error + len(other.rows) * self.error * other.error
+        return Ball(rows, (error >> FIXED) + 2)
+
+    def __add__(self, other: Ball) -> Ball:
+        pairs = zip(self.rows, other.rows, strict=True)
+        return Ball([[a + b for a, b in zip(p, q, strict=True)] for p, q in pairs], self.error + other.error)
+
+    def __sub__(self, other: Ball) -> Ball:
+        pairs = zip(self.rows, other.rows, strict=True)
+        return Ball([[a - b for a, b in zip(p, q, strict=True)] for p, q in pairs], self.error + other.error)
+
+    def beside(self, other: Ball) -> Ball:
+        """Columns of both."""
+        pairs = zip(self.rows, other.rows, strict=True)
+        return Ball([[*p, *q] for p, q in pairs], max(self.error, other.error))
+
+    def over(self, other: Ball) -> Ball:
+        """Rows of both."""
+        return Ball([*self.rows, *other.rows], max(self.error, other.error))
+
+    def part(self, rows: slice, columns: slice) -> Ball:
+        """Some rows and columns."""
+        return Ball([row[columns] for row in self.rows[rows]], self.error)
+
+    def sizes(self) -> Whole:
+        """Bounds on the entries without sign."""
+        return [[abs(v) + self.error for v in row] for row in self.rows]
+
+
+def ball(matrix: Sequence[Sequence[Fraction]]) -> Ball:
+    """A matrix of fractions."""
+    return Ball([[(v.numerator << FIXED) // v.denominator for v in row] for row in matrix], 1)
+
+
+def nothing(rows: int, columns: int) -> Ball:
+    """Zeros."""
+    return Ball([[0] * columns for _ in range(rows)], 0)
+
+
+def eye(count: int) -> Ball:
+    """Unit matrix."""
+    return Ball([[int(i == j) << FIXED for j in range(count)] for i in range(count)], 0)
+
+
+def times_up(first: Whole, second: Whole) -> Whole:
+    """Product of matrices that are not negative, rounded up."""
+    columns = list(zip(*second, strict=True))
+    return [[(sum(map(operator.mul, row, column)) >> FIXED) + 1 for column in columns] for row in first]
+
+
+def exponential_of(matrix: Matrix) -> Ball:
+    """exp(matrix).
+
+    The remainder of the series is below 20^121/121! < 2^-140. Entries are cut to 2^-160, and terms to the same in each
+    of 120 products of at most 300 entries; both grow by no more than exp(20) < 2^29: below 2^-114 together.
     """
     if max(sum(map(abs, row), Fraction(0)) for row in matrix) > MAX_NORM or len(matrix) > 300:
         raise NotProvedError("the plant is too fast for the control period of this certificate")
     sparse = [[(j, (v.numerator << FIXED) // v.denominator) for j, v in enumerate(row) if v] for row in matrix]
-    term = [[(v.numerator << FIXED) // v.denominator for v in row] for row in columns]
-    if max(abs(v) for row in term for v in row) >> (FIXED + 8):
-        raise NotProvedError("the units of this certificate are too far apart")
+    term = eye(len(matrix)).rows
     total = [list(row) for row in term]
-    width = range(len(columns[0]))
+    width = range(len(matrix))
     for k in range(1, TERMS + 1):
         term = [[(sum(a * term[j][c] for j, a in row) >> FIXED) // k for c in width] for row in sparse]
         total = [[a + b for a, b in zip(old, new, strict=True)] for old, new in zip(total, term, strict=True)]
         if k > MAX_NORM and not any(abs(v) > 1 for row in term for v in row):
             break
-    return [[Fraction(v, 1 << FIXED) for v in row] for row in total]
+    return Ball(total, 1 << (FIXED - 113))
 
 
-# --- period ---
+# --- turn ---
 
-def middle_and_spread(bounds: Interval, factor: Fraction) -> tuple[Fraction, Fraction]:
-    """Middle of an interval times a positive factor, and distance of the ends from it."""
-    low, high = down(bounds[0] * factor), up(bounds[1] * factor)
-    middle = down((low + high) / 2)
-    return middle, max(high - middle, middle - low)
+#: Sub-steps of a period for outputs.
+PHASES = 4
 
 
-class Period:
-    """|y(t + T)| <= A |y| + b for y = W z, at every vertex of the uncertain inertias; see `docs/proof.md`.
+def split_of(rows: list[list[Interval]]) -> tuple[Matrix, Matrix]:
+    """Middles of intervals, and distances of the ends from them."""
+    middle = [[down((low + high) / 2) for low, high in row] for row in rows]
+    pairs = zip(rows, middle, strict=True)
+    return middle, [[up(max(v[1] - m, m - v[0])) for v, m in zip(row, own, strict=True)] for row, own in pairs]
 
-    Everything is in units of the box: z_i of half_widths_i, v_k of input_bound_k, time of the period.
+
+class Turn:
+    """The loop of constant numbers for a part of the inertias' ranges, and what it leaves out.
+
+    Everything is in units of the box: z_i of half_widths_i, v_k of input_bound_k, φ̂ - φ* of network_bound_q, time of
+    the period. Z holds z, φ̂ - φ*, and the pending inputs, newest first; columns of maps are over Z, then pulses on the
+    new inputs, pulses on the networks, and measurement errors of the states.
     """
 
-    def __init__(self, claim: Claim, loop: Deviation, cell: Cell, masses: list[Interval]) -> None:
-        self.claim, self.loop, self.cell, self.masses = claim, loop, cell, masses
-        self.n, self.m = len(claim.rows), len(claim.inputs)
-        self._nominal()
-        self.w = [[v * r for v, r in zip(row, claim.half_widths, strict=True)] for row in cell.transform]
-        self.back = inverse_of(self.w)
-        self._rest()
-        self._vertices()
-        self.motion = self._fold(sum_of(self.end[self.n : 2 * self.n], self.end[2 * self.n : 3 * self.n]))
-        self.half_way = [self._half_way(i) for i in range(self.n)]
+    def __init__(self, claim: Claim, loop: Loop, masses: list[Interval]) -> None:
+        self.claim, self.loop = claim, loop
+        self.n, self.m, self.q = len(claim.rows), len(claim.inputs), len(claim.networks)
+        self.order = self.n + self.q + self.m * claim.pending
+        self.width = self.m + self.q + self.n
+        self._plant(masses)
+        self._controller()
+        self._flow()
+        self._phases()
+        self._sample()
 
-    def _half_way(self, i: int) -> Fraction:
-        """T/2 sup|z_i'| over the box: how far z_i gets from the nearest sample."""
-        claim, loop = self.claim, self.loop
-        force = sum((magnitude(loop.entry(i, j)) * r for j, r in enumerate(claim.half_widths)), loop.disturbance[i])
-        for k, input_bound in enumerate(claim.input_bound):
-            force += magnitude(loop.closed[i].get(f"e{k}", ZERO)) * input_bound
-        return claim.period * force / (2 * self.masses[i][0] * claim.half_widths[i])
-
-    def _nominal(self) -> None:
+    def _plant(self, masses: list[Interval]) -> None:
+        """a, b and how far they may be from the truth; μ; known bounds on what acts."""
         claim, loop, n, m = self.claim, self.loop, self.n, self.m
-        self.mass = [down(2 / (1 / low + 1 / high)) for low, high in self.masses]
-        self.change = [
-            up(max(m0 / low - 1, 1 - m0 / high)) for m0, (low, high) in zip(self.mass, self.masses, strict=True)
-        ]
-        rate = [claim.period / (m0 * r) for m0, r in zip(self.mass, claim.half_widths, strict=True)]
-        state = [
-            [middle_and_spread(loop.entry(i, j), rate[i] * claim.half_widths[j]) for j in range(n)] for i in range(n)
-        ]
-        entry = [
-            [middle_and_spread(loop.closed[i].get(f"e{k}", ZERO), rate[i] * claim.input_bound[k]) for k in range(m)]
+        mass = [down(2 / (1 / low + 1 / high)) for low, high in masses]
+        self.change = [up(max(m0 / low - 1, 1 - m0 / high)) for m0, (low, high) in zip(mass, masses, strict=True)]
+        rate = [claim.period / (m0 * r) for m0, r in zip(mass, claim.half_widths, strict=True)]
+
+        def scaled(found: Interval, taken: Fraction, factor: Fraction) -> tuple[Fraction, Fraction]:
+            return taken * factor, up(max(found[1] - taken, taken - found[0], Fraction(0)) * factor)
+
+        force = [[scaled(loop.entry(i, j), claim.force[i][j], rate[i] * claim.half_widths[j]) for j in range(n)]
+                 for i in range(n)]  # fmt: skip
+        drive = [[scaled(loop.closed[i].get(f"e{k}", ZERO), claim.drive[i][k], rate[i] * claim.input_bound[k])
+                  for k in range(m)] for i in range(n)]  # fmt: skip
+        (self.a, self.a_spread), (self.b, self.b_spread) = (
+            ([[v[0] for v in row] for row in part], [[v[1] for v in row] for row in part]) for part in (force, drive)
+        )
+        self.late = [up(loop.late(k) / claim.input_bound[k]) for k in range(m)]
+        self.push = [
+            up((1 + self.change[i]) * (loop.disturbance[i] * rate[i] + sum(
+                ((abs(self.b[i][k]) + self.b_spread[i][k]) * self.late[k] for k in range(m)), Fraction(0))))
             for i in range(n)
-        ]
-        feedback = [
-            [
-                middle_and_spread(f, r / claim.input_bound[k])
-                for f, r in zip(loop.feedback(k), claim.half_widths, strict=True)
-            ]
-            for k in range(m)
-        ]
-        (self.a, self.a_spread), (self.b, self.b_spread), (self.k, self.k_spread) = (
-            ([[v[0] for v in row] for row in part], [[v[1] for v in row] for row in part])
-            for part in (state, entry, feedback)
-        )
-        self.push = [up(d * r) for d, r in zip(loop.disturbance, rate, strict=True)]
-        self.noise = [up(loop.noise_of(k) / claim.input_bound[k]) for k in range(m)]
-        self.drift = [up(claim.period * loop.drift(k) / claim.input_bound[k]) for k in range(m)]
-        self.drive = sum_of(self.a, negative(product_of(self.b, self.k)))
+        ]  # fmt: skip
+        pairs = zip(loop.demand_rate, claim.network_bound, strict=True)
+        self.moving = [up(claim.period * r / bound) for r, bound in pairs]
 
-    def _rest(self) -> None:
-        """The positive system that bounds what the nominal map leaves out, integrated over a period."""
-        n, m, change = self.n, self.m, self.change
-        reach = sum_of(absolute(self.b), self.b_spread)
-        varying = product_of(reach, self.k_spread)
-        ramp, here, inputs, one = (3 + n) * n, (3 + n) * n + m, (4 + n) * n + m, (4 + n) * n + 2 * m
-        size = one + 1
-        system = [[Fraction(0)] * size for _ in range(size)]
+    def _controller(self) -> None:
+        """K, C, G and A of the discrete part: middles and distances from them; how Z(0) follows from Q(0) and φ̂(0)."""
+        claim, loop, n, q = self.claim, self.loop, self.n, self.q
+        scale = [*claim.half_widths, *claim.network_bound]
+        own = claim.networks
+
+        def action(i: int) -> list[Interval]:
+            """-b_i Q_i - c_i over (z, c)."""
+            row = [mul(neg(loop.half[i]), v) for v in error(i)]
+            if i in own:
+                row[n + own.index(i)] = add(row[n + own.index(i)], (Fraction(-1), Fraction(-1)))
+            return row
+
+        def error(i: int) -> list[Interval]:
+            """Q_i over (z, c)."""
+            row, target = [ZERO] * (n + q), claim.rows[i]["target"]
+            row[i] = (Fraction(1), Fraction(1))
+            return (
+                row if isinstance(target, str) else [add(v, neg(w)) for v, w in zip(row, action(target), strict=True)]
+            )
+
+        acts = [[mul(v, _point(s / claim.input_bound[k])) for v, s in zip(action(row), scale, strict=True)]
+                for k, row in enumerate(claim.input_map)]  # fmt: skip
+        learns = []
+        for j, i in enumerate(own):
+            rate = mul(loop.gain[i].gamma, _point(claim.period / claim.network_bound[j]))
+            learns.append([mul(mul(rate, v), _point(s)) for v, s in zip(error(i), scale, strict=True)])
+        (self.act, self.act_spread), (self.learn, self.learn_spread) = split_of(acts), split_of(learns)
+        starts = []
+        for i, row in enumerate(claim.rows):
+            start, target = [ZERO] * (n + q), row["target"]
+            start[i] = _point(Fraction(1))
+            if not isinstance(target, str):
+                start[target] = mul(neg(loop.gain[target].beta), _point(Fraction(1, 2)))
+                if target in own:
+                    start[n + own.index(target)] = _point(Fraction(-1))
+            starts.append([mul(v, _point(s / claim.half_widths[i])) for v, s in zip(start, scale, strict=True)])
+        self.start, self.start_spread = split_of(starts)
+        self.noise = [up(v / r) for v, r in zip(claim.noise, claim.half_widths, strict=True)]
+        self.blur = [up(loop.term_noise(row) / claim.input_bound[k]) for k, row in enumerate(claim.input_map)]
+
+    def _flow(self) -> None:
+        """(z, p)' = flow (z, p) + (b, 0) held; p is what each demand moves since the last sample."""
+        claim, n, m, q = self.claim, self.n, self.m, self.q
+        width = n + q
+        bounds = claim.network_bound
+        pairs, own = list(zip(claim.input_map, claim.input_bound, strict=True)), list(enumerate(claim.networks))
+        self.direct = [[Fraction(int(row == i)) * bounds[j] / size for j, i in own] for row, size in pairs]
+        self.flow = [[Fraction(0)] * width for _ in range(width)]
+        self.sources = [[Fraction(int(i == j)) for j in range(width)] for i in range(width)]
         for i in range(n):
-            source = [Fraction(0)] * size
-            for j in range(n):
-                source[here + j] = self.a_spread[i][j] + varying[i][j]
-                source[n + j] = source[2 * n + j] = self.a_spread[i][j]
-                own = i == j
-                system[i][j] = self.a[i][j] if own else abs(self.a[i][j])
-                system[n + i][j] = Fraction(int(own))
+            self.flow[i][:n] = self.a[i]
+            for j, row in enumerate(claim.networks):
+                self.flow[i][n + j] = sum((self.b[i][k] * self.direct[k][j] for k in range(m)), Fraction(0))
+                if claim.rows[i]["target"] == row:
+                    self.sources[i][n + j] = bounds[j] / claim.half_widths[i]
+
+    def held(self, k: int) -> Ball:
+        """The input computed k samples ago, over the columns."""
+        n, m, q, order = self.n, self.m, self.q, self.order
+        rows = [[Fraction(0)] * (order + m + q + n) for _ in range(m)]
+        for i, row in enumerate(rows):
+            if k:
+                row[n + q + m * (k - 1) + i] = Fraction(1)
+                continue
+            row[: n + q], row[order + m + q :] = self.act[i], self.act[i][:n]
+            row[order + i] = Fraction(1)
+        return ball(rows)
+
+    def _phases(self) -> None:
+        """(z, p) and the held input at both ends of every sub-step, over the columns."""
+        claim, n, m, q = self.claim, self.n, self.m, self.q
+        parts = [(claim.share, self.held(claim.whole + 1))] if claim.share > 0 else []
+        parts.append((1 - claim.share, self.held(claim.whole)))
+        whole = [[*row, *(self.b[i] if i < n else [Fraction(0)] * m)] for i, row in enumerate(self.flow)]
+        whole += [[Fraction(0)] * (n + q + m) for _ in range(m)]
+        x = Ball([[int(i == j and i < n) * eye(1).rows[0][0] for j in range(self.order + m + q + n)]
+                  for i in range(n + q)], 0)  # fmt: skip
+        self.steps: list[Fraction] = []
+        self.ends: list[tuple[Ball, Ball, Ball]] = []
+        for share, acting in parts:
+            pieces = max(1, round(PHASES * share))
+            length = share / pieces
+            forward = exponential_of([[v * length for v in row] for row in whole])
+            free, driven = (
+                forward.part(slice(0, n + q), slice(0, n + q)),
+                forward.part(slice(0, n + q), slice(n + q, None)),
+            )
+            for _ in range(pieces):
+                following = free @ x + driven @ acting
+                self.ends.append((x, following, acting))
+                self.steps.append(length)
+                x = following
+        self.end = x
+
+    def _sample(self) -> None:
+        """Z at the next sample over the columns; how (z, p) at the end of a period enters it; what Z(0) is made of."""
+        claim, n, m, q, order = self.claim, self.n, self.m, self.q, self.order
+        fold = [[Fraction(0)] * (n + q) for _ in range(order)]
+        kept = [[Fraction(0)] * (order + m + q + n) for _ in range(order)]
+        for i in range(n):
+            fold[i][i] = Fraction(1)
+        for j in range(q):
+            fold[n + j][n + j], kept[n + j][n + j] = Fraction(-1), Fraction(1)
+            for i, value in enumerate(self.learn[j]):
+                kept[n + j][i] += value
+            kept[n + j][order + m + q :] = self.learn[j][:n]
+            kept[n + j][order + m + j] = Fraction(1)
+        moved = ball(kept)
+        for k in range(claim.pending):
+            for i in range(m):
+                fold[n + q + m * k + i][n:] = self.direct[i]
+            held = self.held(k)
+            for i in range(m):
+                moved.rows[n + q + m * k + i] = held.rows[i]
+        self.fold = ball(fold)
+        self.image = self.fold @ self.end + moved
+        # Z(0) over Q(0), c(0), measurement errors, errors of the modelling terms
+        width = 2 * n + q + m
+        begin = [[*row, *([Fraction(0)] * (n + m))] for row in self.start]
+        begin += [[Fraction(int(c == n + j)) for c in range(width)] for j in range(q)]
+        for _ in range(claim.pending):
             for k in range(m):
-                source[ramp + k], source[inputs + k] = reach[i][k], self.b_spread[i][k]
-            source[one] = self.push[i]
-            system[2 * n + i] = [(1 + change[i]) * v for v in source]
-            system[2 * n + i][i] += change[i]
-            for j in range(n):
-                grow = max(self.a[i][i], Fraction(0)) if i == j else abs(self.a[i][j])
-                system[2 * n + i][2 * n + j] += grow + change[i] * abs(self.a[i][j])
-            first = (3 + i) * n
-            for k in range(n):
-                system[first + k][first : first + n] = system[k][:n]
-            for j, value in enumerate(source):
-                system[first + i][j] += value
-            for j in range(n):
-                system[first + i][2 * n + j] += change[i] / (1 - change[i]) * abs(self.a[i][j])
-        for k in range(m):
-            system[ramp + k][one] = self.drift[k]
-        system = [[up(v) for v in row] for row in system]
-        begin = [[Fraction(0)] * (2 * n + m + 1) for _ in range(size)]
-        for j in range(n):
-            begin[here + j][j] = begin[j][n + j] = Fraction(1)
-        for k in range(m):
-            begin[inputs + k][2 * n + k] = Fraction(1)
-        begin[one][-1] = Fraction(1)
-        self.end = [[up(v + FIXED_ERROR) for v in row] for row in exponential_times(system, begin)]
+                row = [sum((self.act[k][i] * self.start[i][c] for i in range(n)), Fraction(0)) for c in range(n + q)]
+                for j in range(q):
+                    row[n + j] += self.act[k][n + j]
+                begin.append([*row, *self.act[k][:n], *(Fraction(int(i == k)) for i in range(m))])
+        self.begin = ball(begin)
 
-    def _fold(self, block: Matrix) -> tuple[Matrix, list[Fraction]]:
-        """Rows over (|z|, |c|, |v|, 1) as rows over (|y|, 1)."""
-        n = self.n
-        parts = (([row[:n] for row in block], absolute(self.back)), ([row[n : 2 * n] for row in block], self.speed))
-        parts += (([row[2 * n : -1] for row in block], self.control),)
-        moving = sum_of(*(product_of(*p) for p in parts))
-        # the noise adds to the held input, and so to the speed at the start of a period
-        known = [dot(map(abs, row), self.noise) for row in self.b]
-        return moving, [dot(row[n:-1], known + self.noise) + row[-1] for row in block]
+    def started(self) -> tuple[list[Fraction], list[Fraction]]:
+        """What Z(0) is made of, and bounds on what is not known of its coefficients.
 
-    def _vertices(self) -> None:
-        n, m, w, back = self.n, self.m, self.w, self.back
-        whole = [[*a, *b] for a, b in zip(self.a, self.b, strict=True)] + [[Fraction(0)] * (n + m)] * m
-        flow = exponential_times(whole, identity(n + m))
-        input_bound = [row[n:] for row in flow[:n]]
-        entry = product_of(input_bound, self.k)
-        closed = sum_of([row[:n] for row in flow[:n]], negative(entry))
-        self.control = sum_of(absolute(product_of(self.k, back)), product_of(self.k_spread, absolute(back)))
-        self.speed = absolute(product_of(self.drive, back))
-        effects = {i: product_of(w, self._effect(i)) for i in range(n) if self.change[i] > 0}
-        noise = [[v] for v in self.noise]
-        shaken = product_of(absolute(product_of(w, input_bound)), noise)
-        for i, effect in effects.items():
-            direct = product_of(absolute(product_of(effect, self.b)), noise)
-            shaken = sum_of(shaken, [[self.change[i] * v for v in row] for row in direct])
-        effects = {i: product_of(effect, self.drive, back) for i, effect in effects.items()}
-        shares = []
-        for i in range(n):
-            moving, push = self._fold(self.end[(3 + i) * n : (4 + i) * n])
-            spread = [row[0] for row in product_of(absolute(w), [[v] for v in push])]
-            shares.append((product_of(absolute(w), moving), spread))
-        base, self.vertices = product_of(w, closed, back), []
-        # errors of the exponentials of this method, in units of the box: of Φ, Γ and each effect
-        slack = (
-            (n * n + 4 * (n + m + 2)) * FIXED_ERROR * (1 + max(abs(v) for row in (*self.drive, *self.b) for v in row))
-        )
-        error = product_of(absolute(w), [[slack] * n] * n, absolute(back))
-        error = sum_of(error, product_of(absolute(w), [[slack] * m] * n, self.control))
-        shaken = sum_of(shaken, product_of(absolute(w), [[slack] * m] * n, noise))
-        for signs in product((-1, 1), repeat=len(effects)):
-            change = dict(zip(effects, signs, strict=True))
-            change = {i: sign * self.change[i] for i, sign in change.items()}
-            moving = [[Fraction(0)] * n for _ in range(n)]
-            push = [Fraction(0)] * n
-            for r, c in product(range(n), repeat=2):
-                signed = base[r][c] + sum((d * effects[i][r][c] for i, d in change.items()), Fraction(0))
-                shared = sum((1 + change.get(i, 0)) * shares[i][0][r][c] for i in range(n))
-                moving[r][c] = up(abs(signed) + shared + error[r][c])
-            for r in range(n):
-                push[r] = up(sum(((1 + change.get(i, 0)) * shares[i][1][r] for i in range(n)), shaken[r][0]))
-            self.vertices.append((moving, push))
+        A network starts at its preload under any demand of the range, or where it rested before.
+        """
+        claim, n, q = self.claim, self.n, self.q
+        first = [up(v / r) for v, r in zip(claim.initial, claim.half_widths, strict=True)]
+        for j, i in enumerate(claim.networks):
+            (low, high), preload = claim.demand[j], self.loop.gain[i].preload
+            away = max(abs(preload - low), abs(high - preload)) + ROUNDING * abs(preload)
+            first.append(up(max(away, self.loop.settled[j]) / claim.network_bound[j]))
+        loose = [sum((s * v for s, v in zip(row, first, strict=True)), Fraction(0)) for row in self.start_spread]
+        size = [sum((abs(s) * v for s, v in zip(row, first, strict=True)), Fraction(0)) for row in self.start]
+        unsure = [up(v) for v in loose] + [Fraction(0)] * q
+        felt = [z + w + noise for z, w, noise in zip(size, loose, self.noise, strict=True)] + first[n:]
+        held = [
+            up(sum((abs(v) * w for v, w in zip(self.act[k][:n], loose, strict=True)), Fraction(0))
+               + sum((s * v for s, v in zip(self.act_spread[k], felt, strict=True)), Fraction(0)))
+            for k in range(self.m)
+        ]  # fmt: skip
+        return [*first, *self.noise, *self.blur], unsure + held * claim.pending
 
-    def _effect(self, i: int) -> Matrix:
-        """∫ exp(a (1 - t)) e_i e_i' exp(a t) dt: how a change of the inertia of row i moves the end of a period."""
-        n = self.n
-        block = [[*row, *([Fraction(0)] * n)] for row in self.a] + [[*([Fraction(0)] * n), *row] for row in self.a]
-        block[i][n + i] = Fraction(1)
-        return exponential_times(block, [[Fraction(0)] * n] * n + identity(n))[:n]
 
-    def image(self, bound: list[Fraction], push: bool = True) -> list[Fraction]:
-        """The largest A |y| + b over the vertices, for |y| <= bound; without b where `push` is false."""
-        values = []
-        for moving, shift in self.vertices:
-            step = [dot(row, bound) for row in moving]
-            values.append([v + s for v, s in zip(step, shift, strict=True)] if push else step)
-        return [max(column) for column in zip(*values, strict=True)]
+def _point(value: Fraction) -> Interval:
+    return value, value
 
-    def initial(self) -> list[Fraction]:
-        """|y(0)| over the initial errors: z_i(0) = Q_i(0) - b_t Q_t(0), θ̂ = 0."""
-        claim = self.claim
-        total = []
-        for row in self.cell.transform:
-            weights = [(v, v) for v in row]
-            for i, entry in enumerate(claim.rows):
-                if not isinstance(entry["target"], str):
-                    half = mul(self.loop.gain[entry["target"]].beta, (Fraction(1, 2), Fraction(1, 2)))
-                    weights[entry["target"]] = add(weights[entry["target"]], neg(mul((row[i], row[i]), half)))
-            total.append(sum(magnitude(v) * q for v, q in zip(weights, claim.initial, strict=True)))
+
+# --- sums ---
+
+WHOLE = 1 << FIXED
+
+
+class Piece:
+    """Rows times exp(flow r) times the sources, integrated over a sub-step: exact areas, and bounds on slopes."""
+
+    def __init__(self, turn: Turn, length: Fraction) -> None:
+        size = len(turn.flow)
+        block = [[*(v * length for v in row), *(length * int(i == j) for j in range(size))]
+                 for i, row in enumerate(turn.flow)] + [[Fraction(0)] * (2 * size) for _ in range(size)]  # fmt: skip
+        whole, sources = exponential_of(block), ball(turn.sources)
+        self.forward = whole.part(slice(0, size), slice(0, size))
+        self.area = whole.part(slice(0, size), slice(size, None)) @ sources
+        grown = [[(max(v, Fraction(0)) if i == j else abs(v)) * length for j, v in enumerate(row)]
+                 for i, row in enumerate(turn.flow)]  # fmt: skip
+        self.ceiling = exponential_of(grown).sizes()
+        flow, span = ball([[abs(v) for v in row] for row in turn.flow]).sizes(), (length.numerator << FIXED)
+        span = span // length.denominator + 1
+        self.size = [[(v * span >> FIXED) + 1 for v in row] for row in times_up(self.ceiling, sources.sizes())]
+        self.slope = [[(v * span >> FIXED + 1) + 1 for v in row] for row in times_up(flow, self.size)]
+
+    def integral(self, rows: Ball) -> Whole:
+        """Bounds on ∫|rows exp(flow r) sources| dr."""
+        return larger((rows @ self.area).sizes(), times_up(rows.sizes(), self.slope))
+
+
+def through(rows: Ball, blocks: list[Ball], ends: list[int]) -> Ball:
+    """Rows times a block-diagonal matrix."""
+    parts = [rows.part(slice(None), slice(a, b)) @ block for a, b, block in zip(ends, ends[1:], blocks, strict=False)]
+    made = parts[0]
+    for part in parts[1:]:
+        made = made.beside(part)
+    return made
+
+
+def length_of(values: list[int]) -> int:
+    """Euclidean norm, rounded up."""
+    return abs(values[0]) if len(values) == 1 else math.isqrt(sum(v * v for v in values)) + 1
+
+
+def norm_of(block: Whole) -> int:
+    """Spectral norm of a block of one or two rows, rounded up."""
+    if len(block) == 1:
+        return abs(block[0][0])
+    (a, b), (c, d) = block
+    total, product = a * a + b * b + c * c + d * d, abs(a * d - b * c)
+    # the largest σ² is half of t + sqrt(t² - 4 det²)
+    return math.isqrt((total + math.isqrt(max(total * total - 4 * product * product, 0)) + 1) // 2 + 1) + 1
+
+
+def larger(first: Whole, second: Whole) -> Whole:
+    """The larger of each pair of entries."""
+    return [[max(a, b) for a, b in zip(x, y, strict=True)] for x, y in zip(first, second, strict=True)]
+
+
+def added(*parts: Whole) -> Whole:
+    """Sum of matrices."""
+    return [[sum(values) for values in zip(*rows, strict=True)] for rows in zip(*parts, strict=True)]
+
+
+def times_ratio(part: Whole, numerator: int, denominator: int = 1) -> Whole:
+    """A matrix times a ratio, rounded up."""
+    return [[-(-v * numerator // denominator) for v in row] for row in part]
+
+
+def scaled_up(value: int, factor: Fraction) -> int:
+    """A number times a ratio, rounded up."""
+    return -(-value * factor.numerator // factor.denominator)
+
+
+class Weighted:
+    """Sums or largest values over groups, plain and with weights."""
+
+    def __init__(self, rows: int, columns: int) -> None:
+        self.sums = [[[0] * columns for _ in range(rows)] for _ in range(2)]
+
+    def add(self, found: Whole, weight: int) -> None:
+        """Add a group."""
+        self.sums = [added(self.sums[0], found), added(self.sums[1], times_ratio(found, weight, WHOLE))]
+
+    def keep(self, found: Whole, weight: int) -> None:
+        """Keep what a group has that is larger."""
+        self.sums = [larger(self.sums[0], found), larger(self.sums[1], times_ratio(found, weight, WHOLE))]
+
+
+# --- responses ---
+
+#: Sub-steps of a period for sources, in the first groups and after, and how many groups are first.
+FINE, COARSE, NEAR = 4, 2, 12
+#: Grid of the coordinates of a file.
+SHORTER = 1 << 48
+#: Bits that norms are rounded up by, to keep exact inverses short.
+SHORT = FIXED - 64
+
+
+class Responses:
+    """The norms of a loop, plain and weighted; the columns of `rest` are over ρ and the rates of the demands."""
+
+    def __init__(self, turn: Turn, cell: Cell) -> None:
+        need(len(cell.columns) == turn.order, f"the loop has {turn.order} states with all that it remembers")
+        self.turn, self.cell = turn, cell
+        self.pieces: dict[Fraction, Piece] = {}
+        self._coordinates()
+        self._instants()
+        self._groups()
+
+    def _piece(self, length: Fraction) -> Piece:
+        if length not in self.pieces:
+            self.pieces[length] = Piece(self.turn, length)
+        return self.pieces[length]
+
+    def _coordinates(self) -> None:
+        """Λ, the blocks of V^-1 F V; N, bounds on the norms of all its blocks; and what Λ leaves out."""
+        turn, cell = self.turn, self.cell
+        # any coordinates will do: short ones have an inverse that is soon found
+        rounded = [[Fraction(round(v * SHORTER), SHORTER) for v in row] for row in cell.columns]
+        self.back, columns = ball(inverse_of(rounded)), ball(rounded)
+        self.columns = columns
+        order = turn.order
+        inside = self.back @ turn.image.part(slice(0, order), slice(0, order)) @ columns
+        self.ends = [sum(cell.blocks[:k]) for k in range(len(cell.blocks) + 1)]
+        self.diagonal = []
+        count = len(cell.blocks)
+        self.norms, self.missed = ([[0] * count for _ in range(count)] for _ in range(2))
+        for i in range(count):
+            for j in range(count):
+                part = inside.part(slice(*self.ends[i : i + 2]), slice(*self.ends[j : j + 2]))
+                room = 2 * inside.error
+                if i == j:
+                    self.diagonal.append(part.rows)
+                    self.norms[i][i], self.missed[i][i] = norm_of(part.rows) + room, room
+                else:
+                    self.norms[i][j] = self.missed[i][j] = length_of([v for row in part.rows for v in row]) + room
+        self.norms = [[-(-v >> SHORT) << SHORT for v in row] for row in self.norms]
+        ways = [self._reach(Fraction(1)), self._reach(cell.growth)]
+        self.reach = [way[0] for way in ways]
+        self.astray = [way[1] for way in ways]
+        # with d = (I - g N)^-1 1 it is g N d = d - 1
+        self.spare = min(Fraction(WHOLE, sum(row)) for row in self.reach[1])
+
+    def _reach(self, growth: Fraction) -> tuple[Whole, Whole]:
+        """(I - g N)^-1, and (I - g N)^-1 g E (I - g N)^-1 with E for what Λ leaves out."""
+        count = len(self.norms)
+        grown = [[-growth * Fraction(v, WHOLE) + int(i == j) for j, v in enumerate(row)]
+                 for i, row in enumerate(self.norms)]  # fmt: skip
+        found = inverse_of(grown)
+        # a matrix that is not negative has a spectral radius below 1 where I - N has an inverse that is not negative
+        if min(v for row in found for v in row) < 0 or not all(grown[i][i] > 0 for i in range(count)):
+            raise NotProvedError("the loop does not contract in the coordinates of its certificate")
+        reach = [[-(-(v.numerator << FIXED) // v.denominator) for v in row] for row in found]
+        missed = times_ratio(self.missed, growth.numerator, growth.denominator)
+        return reach, times_up(times_up(reach, missed), reach)
+
+    def _instants(self) -> None:
+        """Rows of the outputs (z, s, v) at both ends of every sub-step, each once, and of c."""
+        turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
+        flow = ball([[*row] for row in turn.flow[:n]])
+        direct = ball([[Fraction(0)] * n + row for row in turn.direct])
+        self.outputs = 2 * n + m
+        self.cx = Ball([*eye(n + q).rows[:n], *flow.rows, *direct.rows], 1)
+        entry = Ball([*nothing(n, m).rows, *ball(turn.b).rows, *eye(m).rows], 1)
+        made: list[Ball] = []
+        index: dict[tuple[int, int], int] = {}
+        self.pairs: list[tuple[int, int]] = []
+        for begin, end, acting in turn.ends:
+            ends = []
+            for x in (begin, end):
+                key = (id(x), id(acting))
+                if key not in index:
+                    index[key] = len(made)
+                    made.append(self.cx @ x + entry @ acting)
+                ends.append(index[key])
+            self.pairs.append((ends[0], ends[1]))
+        width = turn.order + m + q + n
+        rows = [row for part in made for row in part.rows]
+        chosen = [[int(c == n + j) << FIXED for c in range(width)] for j in range(q)]
+        self.rows = Ball([*rows, *chosen], max(part.error for part in made))
+
+    def _groups(self) -> None:
+        """Everything that acts in earlier periods, group by group; then the tail, and the period of the output."""
+        turn, cell, order = self.turn, self.cell, self.turn.order
+        fold, start = self.back @ turn.fold, self.back @ turn.begin
+        acting = self.back @ turn.image.part(slice(0, order), slice(order, None))
+        fine, coarse = (_Grid(self, self._piece(Fraction(1, c)), fold, c) for c in (FINE, COARSE))
+        apart, start_apart = self.across(self.stepped(acting)), self.across(self.stepped(start))
+        row = self.rows.part(slice(None), slice(0, order)) @ self.columns
+        blocks, count, first = self._powers(max(cell.groups)), len(row.rows), self.lengths(row)
+        rest, felt, begun = (Weighted(count, width) for width in (len(turn.sources), turn.width, len(start.rows[0])))
+        weight, weights = WHOLE, self._weights(max(cell.groups))
+        for k, p in enumerate(cell.groups):
+            sizes, (power, total) = self.lengths(row), blocks[p]
+            summed = through(row, total, self.ends)
+            weight = (weight * weights[p] >> FIXED) + 1
+            rest.add((fine if k < NEAR else coarse).integrals(row, summed, sizes, p), weight)
+            direct, largest = (summed @ acting).sizes(), (row @ start).sizes()
+            if p > 1:
+                direct = larger(direct, times_ratio(times_up(sizes, apart), p * (p - 1), 2))
+                largest = added(largest, times_ratio(times_up(sizes, start_apart), p - 1))
+            felt.add(direct, weight)
+            begun.keep(largest, scaled_up(weight, 1 / cell.growth))
+            row = through(row, power, self.ends)
+        last = self.lengths(row)
+        now, given = self._current(), self.rows.part(slice(None), slice(order, None)).sizes()
+        (area, held), entry = coarse.tail(), self.across(acting)
+        unsure = [[-(-(v.numerator << FIXED) // v.denominator)] for v in turn.started()[1]]
+        unknown = self.bounded(times_up(self.back.sizes(), unsure))
+        self.sums = []
+        for k, growth in enumerate((Fraction(1), cell.growth)):
+            strayed = times_up(first, self.astray[k])
+            final = added(times_ratio(last, weight, WHOLE) if k else last, strayed)
+            tail = times_ratio(times_up(final, self.reach[k]), growth.numerator, growth.denominator)
+            off = times_ratio(strayed, growth.numerator, growth.denominator)
+            whole = added(rest.sums[k], now, times_up(tail, area), times_up(off, held))
+            acted = added(felt.sums[k], given, times_up(tail, entry), times_up(off, entry))
+            settling = self._settling(self.across(start), k)
+            known = larger(added(begun.sums[k], times_up(off, self.across(start))), times_up(final, settling))
+            more = times_up(first, self._settling(unknown, k))
+            self.sums.append((self._between(whole, own=True), self._between(acted),
+                              self._between([[*x, *y] for x, y in zip(known, more, strict=True)])))  # fmt: skip
+
+    def _settling(self, entry: Whole, k: int) -> Whole:
+        """D with x <= d and g N d <= d: bounds g^j N^j x for all j."""
+        growth = self.cell.growth if k else Fraction(1)
+        grown = times_ratio(self.norms, growth.numerator, growth.denominator)
+        ahead = [
+            [max(a - b, 0) for a, b in zip(x, y, strict=True)]
+            for x, y in zip(times_up(grown, entry), entry, strict=True)
+        ]
+        return added(entry, times_up(self.reach[k], ahead))
+
+    def _powers(self, largest: int) -> dict[int, tuple[list[Ball], list[Ball]]]:
+        """Λ^p and 1 + Λ + … + Λ^(p-1) for every size of a group."""
+        wanted, found = set(self.cell.groups), {}
+        power = [eye(len(block)) for block in self.diagonal]
+        total = [nothing(len(block), len(block)) for block in self.diagonal]
+        blocks = [Ball(block, 0) for block in self.diagonal]
+        for p in range(1, largest + 1):
+            total = [t + w for t, w in zip(total, power, strict=True)]
+            power = [w @ b for w, b in zip(power, blocks, strict=True)]
+            if p in wanted:
+                found[p] = power, total
+        return found
+
+    def _weights(self, largest: int) -> list[int]:
+        """growth^p, rounded up."""
+        growth, found = scaled_up(WHOLE, self.cell.growth), [WHOLE]
+        for _ in range(largest):
+            found.append((found[-1] * growth >> FIXED) + 1)
+            if found[-1] >> 2 * FIXED:
+                raise NotProvedError("the weight of the transient is too large for these periods")
+        return found
+
+    def lengths(self, rows: Ball) -> Whole:
+        """Norms by block of rows over y."""
+        ends, error = self.ends, 2 * rows.error
+        return [[length_of(row[a:b]) + error for a, b in pairwise(ends)] for row in rows.rows]
+
+    def across(self, columns: Ball) -> Whole:
+        """Norms by block of columns over y."""
+        return self.bounded(columns.sizes())
+
+    def bounded(self, sizes: Whole) -> Whole:
+        """The same of bounds on their entries."""
+        ends = self.ends
+        return [[length_of([row[c] for row in sizes[a:b]]) for c in range(len(sizes[0]))]
+                for a, b in pairwise(ends)]  # fmt: skip
+
+    def stepped(self, columns: Ball) -> Ball:
+        """(Λ - 1) times columns."""
+        rows, error = [], 0
+        for block, first in zip(self.diagonal, self.ends, strict=False):
+            part = Ball(block, 0) @ columns.part(slice(first, first + len(block)), slice(None))
+            rows, error = [*rows, *part.rows], max(error, part.error)
+        return Ball(rows, error) - columns
+
+    def _current(self) -> Whole:
+        """What acts in the period of the output, before it."""
+        turn, size = self.turn, self.outputs
+        pieces = [self._piece(h) for h in turn.steps]
+        found = [[0] * len(turn.sources) for _ in self.rows.rows]
+        written: set[int] = set()
+        for j in range(len(turn.steps)):
+            rows, total = self.cx, [[0] * len(turn.sources) for _ in range(size)]
+            for i in range(j, -1, -1):
+                total = added(total, pieces[i].integral(rows))
+                rows = rows @ pieces[i].forward
+            ends = [self.pairs[j][1]] + ([self.pairs[j + 1][0]] if j + 1 < len(turn.steps) else [])
+            for place in ends:
+                if place not in written:
+                    written.add(place)
+                    found[place * size : (place + 1) * size] = total
+        return found
+
+    def _between(self, values: Whole, *, own: bool = False) -> Whole:
+        """The largest over all phases, from both ends of each sub-step, with h²/8 of the curvature between them."""
+        turn, n, q, size = self.turn, self.turn.n, self.turn.q, self.outputs
+        width = len(values[0])
+        best = [[0] * width for _ in range(size)]
+        bend = (self.cx @ ball(turn.flow)).sizes()
+        for (early, late), h in zip(self.pairs, turn.steps, strict=True):
+            a, b = (values[place * size : (place + 1) * size] for place in (early, late))
+            speed = [*a[n : 2 * n], *[[0] * width for _ in range(q)]]
+            speed = added(speed, ball(turn.sources).sizes()) if own else speed
+            curved = times_up(times_up(bend, self._piece(h).ceiling), speed)
+            square = -(-((h * h / 8).numerator << FIXED) // (h * h / 8).denominator)
+            more = [[(v * square >> FIXED) + 1 for v in row] for row in curved]
+            best = larger(best, added(larger(a, b), more))
+        return [*best, *values[len(values) - turn.q :]]
+
+
+class _Grid:
+    """Sub-steps of a period for sources, in coordinates y."""
+
+    def __init__(self, responses: Responses, piece: Piece, fold: Ball, count: int) -> None:
+        self.responses, self.piece = responses, piece
+        self.parts: list[tuple[Ball, Ball, Whole]] = []
+        for _ in range(count):
+            self.parts.append((fold, fold @ piece.area, responses.across(responses.stepped(fold))))
+            fold = fold @ piece.forward
+
+    def tail(self) -> tuple[Whole, Whole]:
+        """Bounds by block on the integrals over a period of all that acts, with its signs and without."""
+        bounded, areas, sizes = self.responses.bounded, [], []
+        for inward, area, _ in self.parts:
+            within = inward.sizes()
+            areas.append(larger(self.responses.across(area), bounded(times_up(within, self.piece.slope))))
+            sizes.append(bounded(times_up(within, self.piece.size)))
+        return added(*areas), added(*sizes)
+
+    def integrals(self, row: Ball, summed: Ball, sizes: Whole, p: int) -> Whole:
+        """Bounds on the integrals of a group of p periods, over a period."""
+        total: Whole = []
+        for inward, area, apart in self.parts:
+            here = (row @ inward).sizes()
+            change = times_up(sizes, apart) if p > 1 else [[0] * len(here[0])] * len(here)
+            moved = [[a + (p - 1) * b for a, b in zip(x, y, strict=True)] for x, y in zip(here, change, strict=True)]
+            bound = times_up(moved, self.piece.slope)
+            if p > 1:
+                half = times_up(change, self.piece.size)
+                bound = [
+                    [a + (p - 1) * b // 2 + 1 for a, b in zip(x, y, strict=True)]
+                    for x, y in zip(bound, half, strict=True)
+                ]
+            found = larger((summed @ area).sizes(), [[p * v for v in line] for line in bound])
+            total = added(total, found) if total else found
         return total
-
-    def states(self, bound: list[Fraction]) -> list[Fraction]:
-        """Bounds on |z(t)| for all t, between samples too, in units of the box, for |y| <= bound at the samples."""
-        moving, push = self.motion
-        found = []
-        for i in range(self.n):
-            moved = min(dot(moving[i], bound) + push[i], self.half_way[i])
-            found.append(up(dot(map(abs, self.back[i]), bound) + moved))
-        return found
-
-    def speeds(self, bound: list[Fraction]) -> list[Fraction]:
-        """Bounds on |z_i'| for all t, in the box's unit a period, for |y| <= bound at the samples."""
-        here = [dot(map(abs, row), bound) for row in self.back]
-        # from the sample before, whose state the held input answers to
-        moving, push = self.motion
-        drawn = [dot(row, bound) + p for row, p in zip(moving, push, strict=True)]
-        moved = [min(own, 2 * half) for own, half in zip(drawn, self.half_way, strict=True)]
-        total = [a + b for a, b in zip(here, moved, strict=True)]
-        shaken = [n + d + dot(row, here) for n, d, row in zip(self.noise, self.drift, self.k_spread, strict=True)]
-        found = []
-        for i in range(self.n):
-            size = dot(self.speed[i], bound) + dot(map(abs, self.a[i]), moved) + dot(map(abs, self.b[i]), shaken)
-            size += dot(self.a_spread[i], total) + sum(self.b_spread[i], self.push[i])
-            found.append(up(min((1 + self.change[i]) * size, 2 * self.half_way[i])))
-        return found
-
-    def inputs(self, bound: list[Fraction]) -> list[Fraction]:
-        """Bounds on |u - m|, noise and drift included, in units of the box."""
-        rows = zip(self.control, self.noise, self.drift, strict=True)
-        return [dot(row, bound) + noise + drift for row, noise, drift in rows]
 
 
 # --- obligation ---
@@ -2501,191 +2959,187 @@ def percent(share: Fraction | float, *, up: bool) -> str:
     return f"{upward(100 * Fraction(share), 3) if up else downward(100 * Fraction(share), 3)} %"
 
 
-# --- composition ---
+# --- impulse ---
 
-def positive_definite(matrix: list[list[Fraction]]) -> bool:
-    """Strict definiteness of a symmetric rational matrix by exact LDLᵀ."""
-    rest = [list(row) for row in matrix]
-    while rest:
-        pivot = rest[0][0]
-        if pivot <= 0:
-            return False
-        head = rest[0]
-        rest = [[row[j] - row[0] * head[j] / pivot for j in range(1, len(row))] for row in rest[1:]]
-    return True
+#: What a guess is made for is enlarged by this share, so that the exact inequality is strict.
+ROOM = Fraction(1, 1 << 30)
 
 
-def conditions_hold(claim: Claim, loop: Loop, spare: Fraction) -> bool:
-    """P - (μ/2 + spare/2) diag(w M) positive definite at every sign vertex (Rohn 1994)."""
-    n, w = len(claim.rows), claim.weights
-    middle = [[Fraction(0)] * n for _ in range(n)]
-    radius = [[Fraction(0)] * n for _ in range(n)]
-    for i in range(n):
-        adapted = loop.own_gain(i) * w[i] * claim.leak[i] / 2 if i in loop.gain and claim.leak[i] > 0 else Fraction(0)
-        decay = (claim.decay + spare) / 2 * w[i] * loop.mass[i][1]
-        middle[i][i] = down(-w[i] * loop.entry(i, i)[1] + adapted - w[i] * claim.young[i] / 2 - decay)
-        for j in range(i):
-            a, b = loop.entry(i, j), loop.entry(j, i)
-            low, high = down(-(w[i] * a[1] + w[j] * b[1]) / 2), up(-(w[i] * a[0] + w[j] * b[0]) / 2)
-            middle[i][j] = middle[j][i] = (low + high) / 2
-            radius[i][j] = radius[j][i] = (high - low) / 2
-    WORK.one(2 ** (n - 1) * n**3)
-    for signs in product((1, -1), repeat=n - 1):
-        z = (1, *signs)
-        if not positive_definite([[middle[i][j] - z[i] * z[j] * radius[i][j] for j in range(n)] for i in range(n)]):
-            return False
-    return True
+class Bounded:
+    """One cell: what y = (z, s, v, c) reaches, and how fast what a start makes of it shrinks."""
+
+    def __init__(self, turn: Turn, cell: Cell) -> None:
+        self.turn, self.cell = turn, cell
+        found = Responses(turn, cell)
+        self.spare = found.spare
+        plain, weighted = ([_fractions(part) for part in sums] for sums in found.sums)
+        self.reads, pulses = self._reads()
+        n, q, m = turn.n, turn.q, turn.m
+        self.gain = [self._gain(sums) for sums in (plain, weighted)]
+        forced = [dot(row[:n], turn.push) + dot(row[n:], turn.moving) for row in plain[0]]
+        forced = [v + dot(row, [*pulses, *turn.noise]) for v, row in zip(forced, plain[1], strict=True)]
+        first = [*turn.started()[0], Fraction(1)]
+        begun = [[dot(row, first) for row in sums[2]] for sums in (plain, weighted)]
+        self.forced = bounded(self.gain[0], forced)
+        self.whole = bounded(self.gain[0], [a + b for a, b in zip(forced, begun[0], strict=True)])
+        self.amplitude = bounded(self.gain[1], begun[1])
+        acted = [dot(row, self.whole) + push for row, push in zip(self.reads[:n], turn.push, strict=True)]
+        moved = [dot(row[n:], turn.moving) for row in turn.sources[:n]]
+        self.rates = [up(s + r + p) for s, r, p in zip(self.whole[n : 2 * n], acted, moved, strict=True)]
+        self.inputs = [v + late for v, late in zip(self.whole[2 * n : 2 * n + m], turn.late, strict=True)]
+        self.missed = self.whole[2 * n + m :]
+        assert len(self.missed) == q
+
+    def _reads(self) -> tuple[Matrix, list[Fraction]]:
+        """S: |ρ| and the pulses on inputs and networks over y; and what of the pulses is known."""
+        turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
+        nothing = [Fraction(0)] * q
+        reads = []
+        for i in range(n):
+            more = 1 + turn.change[i]
+            row = [more * v for v in turn.a_spread[i]]
+            row += [turn.change[i] * int(i == j) for j in range(n)]
+            reads.append([*row, *(more * v for v in turn.b_spread[i]), *nothing])
+        known = list(turn.blur) + nothing
+        for k, row in enumerate([*turn.act_spread, *turn.learn_spread]):
+            reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:]])
+            known[k] += dot(row[:n], turn.noise)
+        return [[up(v) for v in row] for row in reads], [up(v) for v in known]
+
+    def _gain(self, sums: list[Matrix]) -> Matrix:
+        """Λ S."""
+        n, m, q = self.turn.n, self.turn.m, self.turn.q
+        columns = list(zip(*self.reads, strict=True))
+        return [
+            [up(dot([*rest[:n], *pulses[: m + q]], column)) for column in columns]
+            for rest, pulses in zip(sums[0], sums[1], strict=True)
+        ]
+
+    def contracts(self) -> Fraction:
+        """1 - max (Λ S s)_i / s_i for an s > 0 in which the gain is small, of both sums."""
+        return min(1 - max(dot(row, s) / own for row, own in zip(gain, s, strict=True)) for gain in self.gain
+                   for s in [bounded(gain, [Fraction(1)] * len(gain))])  # fmt: skip
 
 
-def leak_is_sound(claim: Claim, loop: Loop) -> bool:
-    """θ̂ may be part of V only in a controlled row that adapts and whose gain cannot change sign."""
-    used = [i for i, leak in enumerate(claim.leak) if leak > 0]
-    return all(i in loop.gain and loop.gain[i].epsilon[0] > 0 and loop.own_gain(i) > 0 for i in used)
+def _fractions(part: Whole) -> Matrix:
+    return [[up(Fraction(v, 1 << FIXED)) for v in row] for row in part]
 
 
-def level(claim: Claim, loop: Loop) -> Fraction:
-    """c/μ."""
-    total = Fraction(0)
-    for i, w in enumerate(claim.weights):
-        total += w * loop.disturbance[i] ** 2 / (2 * claim.young[i])
-        if claim.leak[i] > 0:
-            gain = loop.gain[i]
-            star = claim.leak[i] / gain.epsilon[0]
-            leaked = gain.sigma[1] * star**2 / 2
-            residual = max(loop.theta[i], star) * loop.adaptation_residual(i) / gain.delta[0]
-            total += w * loop.own_gain(i) * (leaked + residual)
-    return up(total / claim.decay)
+def bounded(gain: Matrix, known: list[Fraction]) -> list[Fraction]:
+    """Y > 0 with known + gain y < y: nothing larger satisfies y <= known + gain y. The guess is of floats."""
+    count, room = len(known), ROOM * (max(known) or 1)
+    known = [k + room for k in known]
+    if max(*known, *(v for row in gain for v in row)) > MOST:
+        raise NotProvedError("the uncertainty is too large for this loop: its gain is not small")
+    work = [[float(int(i == j) - v) for j, v in enumerate(row)] + [float(k)] for i, (row, k) in
+            enumerate(zip(gain, known, strict=True))]  # fmt: skip
+    for i in range(count):
+        pivot = max(range(i, count), key=lambda k: abs(work[k][i]))
+        work[i], work[pivot] = work[pivot], work[i]
+        if not abs(work[i][i]) > 0:
+            break
+        work[i] = [v / work[i][i] for v in work[i]]
+        for k in range(count):
+            if k != i:
+                factor = work[k][i]
+                work[k] = [a - factor * b for a, b in zip(work[k], work[i], strict=True)]
+    if all(0 < row[-1] < 1e300 for row in work):
+        guess = [up(Fraction(row[-1])) for row in work]
+        if all(k - room + dot(row, guess) < own for row, own, k in zip(gain, guess, known, strict=True)):
+            return guess
+    raise NotProvedError("the uncertainty is too large for this loop: its gain is not small")
 
 
-def start(claim: Claim, loop: Loop) -> Fraction:
-    """The largest V over the initial errors, θ̂(0) = 0."""
-    total = Fraction(0)
-    for i, w in enumerate(claim.weights):
-        total += w * loop.mass[i][1] * claim.initial[i] ** 2 / 2
-        if claim.leak[i] > 0:
-            star = claim.leak[i] / loop.gain[i].epsilon[0]
-            total += w * loop.own_gain(i) * star**2 / (2 * loop.gain[i].delta[0])
-    return up(total)
-
-
-def spare_decay(claim: Claim, loop: Loop) -> Fraction:
-    """By how much μ could grow before the conditions fail, to a part in 4096; negative where they fail already."""
-    if not conditions_hold(claim, loop, Fraction(0)):
-        return -claim.decay
-    low, high = Fraction(0), claim.decay
-    for _ in range(12):
-        trial = (low + high) / 2
-        low, high = (trial, high) if conditions_hold(claim, loop, trial) else (low, trial)
-    return low
-
-
-class Composed:
-    """Verdicts of a composition certificate."""
+class Impulse:
+    """Verdicts on a member: each cell of the inertias' ranges by itself."""
 
     def __init__(self, claim: Claim, loop: Loop) -> None:
-        if not leak_is_sound(claim, loop):
-            raise NotProvedError("theta is part of V in a row that does not adapt or whose gain may change sign")
         self.claim, self.loop = claim, loop
-
-    def contracts(self) -> bool:
-        """The matrix condition."""
-        return conditions_hold(self.claim, self.loop, Fraction(0))
-
-    def contraction(self) -> tuple[str, str, Fraction]:
-        """Name, statement and margin of the matrix condition."""
-        statement = f"P - (mu/2) diag(w M) > 0 at every vertex, mu = {float(self.claim.decay):.4g} 1/s"
-        return "composition", statement, spare_decay(self.claim, self.loop)
-
-    def invariance(self) -> Fraction:
-        """The smallest share by which a side of the box exceeds what can be reached; negative where it can be left."""
-        claim, loop = self.claim, self.loop
-        top = max(level(claim, loop), start(claim, loop))
-        spare = []
-        for i, radius in enumerate(claim.half_widths):
-            by_energy = root(up(2 * top / (claim.weights[i] * loop.mass[i][0])), True)
-            pull, push = -loop.entry(i, i)[1], loop.disturbance[i]
-            push += sum(magnitude(loop.entry(i, j)) * r for j, r in enumerate(claim.half_widths) if j != i)
-            by_row = max(push / pull, claim.initial[i]) if pull > 0 else by_energy
-            spare.append(1 - min(by_energy, by_row) / radius)
-        return min(spare)
-
-    def sampling(self) -> tuple[str, Fraction]:
-        """The assumed input error against what the rows make of it."""
-        errors = [self.loop.input_error(k) for k in range(len(self.claim.input_bound))]
-        spare = min(1 - e / h if h > 0 else -e for h, e in zip(self.claim.input_bound, errors, strict=True))
-        return "held inputs stay within the assumed error of the continuous law", spare
-
-    def ultimate(self, i: int) -> Fraction:
-        """Bound on |Q_i| from the end of the transient on: V <= c/μ + (V(0) - c/μ) exp(-μt) where V(0) > c/μ."""
-        claim, loop = self.claim, self.loop
-        settled = level(claim, loop)
-        excess = max(Fraction(0), start(claim, loop) - settled)
-        if excess > 0:
-            settled += up(excess * exponential(-min(claim.decay * claim.transient, Fraction(100)))[1])
-        energy = root(up(2 * settled / (claim.weights[i] * loop.mass[i][0])), True)
-        return min(energy, claim.half_widths[i])
-
-
-# --- sampled ---
-
-#: What a cell costs for each of its vertices and a power of its rows, in products.
-CELL_COST = 10
-
-
-class Held:
-    """Verdicts of a sampled certificate: each cell of the inertias' ranges by itself."""
-
-    def __init__(self, claim: Claim, loop: Deviation) -> None:
-        self.claim = claim
-        size, uncertain = len(loop.mass), sum(low < high for low, high in loop.mass)
-        WORK.one(CELL_COST * len(claim.cells) * (2**uncertain + 8) * size**3)
+        for cell in claim.cells:
+            rows, substeps = 5 * (2 * len(claim.rows) + 1), 2 * len(cell.groups) + FINE * NEAR
+            order = len(cell.columns)
+            WORK.one(
+                (rows * substeps * order * (len(claim.rows) + 1) + 8 * max(cell.groups) * order + 20 * order**3) // COST
+            )
         cuts = []
         for (low, high), count in zip(loop.mass, claim.split, strict=True):
-            width = (high - low) / max(count, 1)
+            width = (high - low) / count
             cuts.append([(low + k * width, low + (k + 1) * width) for k in range(count)])
         parts = zip(claim.cells, product(*cuts), strict=True)
-        self.periods = [Period(claim, loop, cell, list(masses)) for cell, masses in parts]
+        self.cells = [Bounded(Turn(claim, loop, list(masses)), cell) for cell, masses in parts]
 
-    def contracts(self) -> bool:
-        """A s <= (1 - μT) s at every vertex."""
-        return self.contraction()[2] >= 0
+    def contraction(self) -> Fraction:
+        """How far the slowest cell is from not contracting, with the weight of its transient."""
+        return min(cell.spare for cell in self.cells)
 
-    def contraction(self) -> tuple[str, str, Fraction]:
-        """By how much μ could grow; fails where s does not cover P - R."""
-        claim, margins = self.claim, []
-        for period in self.periods:
-            cell = period.cell
-            shrunk = period.image(cell.shape, push=False)
-            spare = (1 - max(v / s for v, s in zip(shrunk, cell.shape, strict=True))) / claim.period - claim.decay
-            covered = all(s >= p - r for s, p, r in zip(cell.shape, cell.start, cell.reach, strict=True))
-            margins.append(spare if covered else -claim.decay)
-        statement = f"A s <= (1 - mu T) s at every vertex, mu = {float(claim.decay):.4g} 1/s"
-        return "contraction", statement, min(margins)
+    def small_gain(self) -> Fraction:
+        """1 less the gain of what is uncertain."""
+        return min(cell.contracts() for cell in self.cells)
 
     def invariance(self) -> Fraction:
-        """Between samples too, deviations and held inputs stay inside the box in which the model was bounded."""
-        return 1 - max(max(p.states(p.cell.start) + p.inputs(p.cell.start)) for p in self.periods)
+        """Deviations, inputs, networks and demands stay inside the box in which the model was bounded."""
+        claim, spare = self.claim, []
+        for cell in self.cells:
+            spare += [1 - v for v in (*cell.whole[: cell.turn.n], *cell.inputs, *cell.missed)]
+        for found, taken in zip(self.loop.demand, claim.demand, strict=True):
+            size = max(abs(end) for end in taken) or Fraction(1)
+            spare += [(found[0] - taken[0]) / size, (taken[1] - found[1]) / size]
+        return min(spare)
 
-    def sampling(self) -> tuple[str, Fraction]:
-        """A R + b < R and max(A P + b, |y(0)|) < P: neither set is left."""
-        spare = []
-        for period in self.periods:
-            cell = period.cell
-            begun = map(max, period.image(cell.start), period.initial())
-            pairs = [*zip(period.image(cell.reach), cell.reach, strict=True), *zip(begun, cell.start, strict=True)]
-            spare += [1 - v / r for v, r in pairs]
-        return "the exact zero-order-hold map keeps the comparison bounds", min(spare)
+    def estimates(self) -> list[Fraction]:
+        """Bounds on |φ̂| of the rows with a network."""
+        pairs = zip(self.claim.demand, self.claim.network_bound, strict=True)
+        return [max(abs(low), abs(high)) + bound for (low, high), bound in pairs]
+
+    def _after(self, time: Fraction) -> list[Fraction]:
+        """Bounds on y from a time on, in units of the box."""
+        periods, found = int(time / self.claim.period), []
+        for cell in self.cells:
+            left = 1 / _power(cell.cell.growth, periods)
+            parts = zip(cell.forced, cell.amplitude, cell.whole, strict=True)
+            found.append([min(forced + left * start, whole) for forced, start, whole in parts])
+        return [max(column) for column in zip(*found, strict=True)]
 
     def ultimate(self, i: int) -> Fraction:
         """Bound on |z_i| from the end of the transient on."""
-        claim, found = self.claim, []
-        time = max(Fraction(0), min(claim.decay * (claim.transient - claim.period), Fraction(100)))
-        left = exponential(-time)[1]
-        for period in self.periods:
-            cell = period.cell
-            late = [min(r + s * left, p) for r, s, p in zip(cell.reach, cell.shape, cell.start, strict=True)]
-            found.append(period.states(late)[i])
-        return min(up(max(found) * claim.half_widths[i]), claim.half_widths[i])
+        claim = self.claim
+        return min(up(self._after(claim.transient)[i] * claim.half_widths[i]), claim.half_widths[i])
+
+    def largest(self, name: str) -> Fraction:
+        """Bound on |input| as commanded, or on |state|: the start while the reference rests, what is left in motion."""
+        claim, loop, n, m = self.claim, self.loop, len(self.claim.rows), len(self.claim.inputs)
+        whole = [*claim.half_widths, *claim.input_bound]
+        if not claim.rest[1] > 0:
+            return loop.size(name, whole, resting=False)
+        after = self._after(claim.rest[1])
+        late = [max(cell.turn.late[k] for cell in self.cells) for k in range(m)]
+        moved = [*after[:n], *(v + w for v, w in zip(after[2 * n : 2 * n + m], late, strict=True))]
+        moving = [min(up(v * r), r) for v, r in zip(moved, whole, strict=True)]
+        return max(loop.size(name, moving, resting=False), loop.size(name, whole, resting=True))
+
+    def speed(self, i: int) -> Fraction:
+        """Bound on |z_i'| for all t."""
+        return up(max(cell.rates[i] for cell in self.cells) * self.claim.half_widths[i] / self.claim.period)
+
+    def rate(self) -> Fraction:
+        """A bound from below on the rate at which what a start makes shrinks, 1/s: ln g >= 2 (g - 1)/(g + 1)."""
+        least = min(cell.cell.growth for cell in self.cells)
+        return 2 * (least - 1) / (least + 1) / self.claim.period
+
+
+#: A power that is larger than this counts as this.
+MOST = Fraction(1 << 256)
+#: What a product of a summation costs, in products of intervals.
+COST = 40
+
+
+def _power(base: Fraction, exponent: int) -> Fraction:
+    """base^exponent for base >= 1, rounded down."""
+    found, bits = Fraction(1), FIXED
+    for bit in bin(exponent)[2:]:
+        found = found * found * (base if bit == "1" else 1)
+        found = min(Fraction((found.numerator << bits) // found.denominator, 1 << bits), MOST)
+    return found
 
 
 # --- golden ---
@@ -2709,31 +3163,47 @@ SHARE, TINIEST = 1e-9, 1e-300
 def _golden_one(vector: dict[str, Any], claim: Claim) -> list[tuple[float, Any]]:
     """What follows and what is recorded, for every component."""
     n, k = len(claim.rows), len(claim.controlled)
-    x, r, theta = (
-        [float(v) for v in numbers(vector[key], count, "golden")] for key, count in (("x", n), ("r", 4), ("theta", k))
+    x, r, theta, phi = (
+        [float(v) for v in numbers(vector[key], count, "golden")]
+        for key, count in (("x", n), ("r", 4), ("theta", k), ("phi", k))
     )
     named = {row["state"]: value for row, value in zip(claim.rows, x, strict=True)}
     named |= {f"r{j}": value for j, value in enumerate(r)}
     named |= {f"nominal.{name}": float(value) for name, value in claim.nominal.items()}
-    foreseen = numbers(vector.get("load", []), len(claim.feedforward), "golden")
-    named |= {f"nominal.{name}": float(value) for name, value in zip(claim.feedforward, foreseen, strict=True)}
+    known = [name for name in claim.feedforward if name not in claim.nominal]
+    foreseen = numbers(vector.get("load", []), len(known), "golden")
+    named |= {f"nominal.{name}": float(value) for name, value in zip(known, foreseen, strict=True)}
     virtual: dict[int, float] = {}
-    following: list[float] = []
+    following, errors = [], []
     for j, i in enumerate(claim.controlled):
         target = claim.rows[i]["target"]
         goal = r[0] if target == "reference" else 0.0 if target == "zero" else virtual[target]
-        beta, epsilon, delta, sigma = (float(g) for g in claim.gains[j])
+        beta, epsilon, delta, sigma, *_ = (float(g) for g in claim.gains[j])
         error, program = x[i] - goal, claim.law[j]
         term = walk(program, named.__getitem__, float, float_apply)[program["outputs"][0]]
-        virtual[i] = -(beta + epsilon * theta[j]) * error / 2 + term
+        virtual[i] = -(beta + epsilon * theta[j]) * error / 2 + term - phi[j]
+        errors.append(error)
         step = epsilon * delta * error * error / 2 - delta * sigma * theta[j]
         following.append(theta[j] + float(claim.period) * step)
-    wanted = [virtual[row] for row in claim.input_map]
-    norm, limit = math.hypot(*wanted), float(claim.limits[0]["value"])
-    wanted = [value * (limit / max(norm, limit)) for value in wanted]
+    asked = [virtual[row] for row in claim.input_map]
+    norm, limit = math.hypot(*asked), float(claim.limits[0]["value"])
+    wanted = [value * (limit / max(norm, limit)) for value in asked]
+    learned = []
+    for j, i in enumerate(claim.controlled):
+        gamma, capacity, own = float(claim.gains[j][4]), float(claim.gains[j][5]), _input_of(claim, i)
+        held = abs(asked[own]) > abs(wanted[own]) and -errors[j] * asked[own] > 0
+        step = 0.0 if held else float(claim.period) * gamma * errors[j]
+        learned.append(min(max(phi[j] + step, -capacity), capacity))
     pairs = list(zip(wanted, numbers(vector["u"], len(wanted), "golden"), strict=True))
     pairs += zip(following, numbers(vector["theta_next"], k, "golden"), strict=True)
+    pairs += zip(learned, numbers(vector["phi_next"], k, "golden"), strict=True)
     return pairs
+
+
+def _input_of(claim: Claim, row: int) -> int:
+    """The input at the end of the chain that a row begins."""
+    following = next((j for j in claim.controlled if claim.rows[j]["target"] == row), None)
+    return claim.input_map.index(row) if following is None else _input_of(claim, following)
 
 
 def float_apply(operator: str, a: float, b: float = 0.0) -> float:
@@ -2762,9 +3232,9 @@ def effects_of(claim: Claim, ranges: dict[str, Interval]) -> dict[str, Fraction]
         ranges: Range of every state and input over the certified set.
     """
     stated = {**claim.parameters, **claim.disturbances}
-    middle = {name: float((low + high) / 2) for name, (low, high) in stated.items()}
     for name, (value, _) in claim.feedforward.items():
-        middle[name] = float(value[0] + value[1]) / 2
+        stated[name] = value[0] + stated[name][0], value[1] + stated[name][1]
+    middle = {name: float((low + high) / 2) for name, (low, high) in stated.items()}
     points = [{name: _clipped(low, high, share) for name, (low, high) in ranges.items()} for share in SHARES]
     rates = [_rates(claim, {**middle, **point}) for point in points]
     size = [max(max(abs(r[i]) for r in rates), 1e-300) for i in range(len(claim.rows))]
@@ -2821,40 +3291,11 @@ def felt(
 
 # --- obligations ---
 
-def judge(claim: Claim, inflate: Fraction) -> tuple[Loop, Composed | Held]:
-    """The closed loop for all gains within a relative distance, and the verdicts on it."""
-    if claim.kind == "sampled":
-        moved = Deviation(claim, inflate)
-        return moved, Held(claim, moved)
-    loop = Loop(claim, inflate)
-    return loop, Composed(claim, loop)
-
-
-def holds(claim: Claim, loop: Loop, verdict: Composed | Held) -> bool:
-    """All obligations that depend on the gains."""
-    return (
-        verdict.contracts()
-        and verdict.invariance() > 0
-        and all(slack > 0 for slack, _, _ in authority(claim, loop))
-        and verdict.sampling()[1] > 0
-        and adaptation(claim, loop) >= 0
-        and verdict.ultimate(0) <= claim.accuracy
-    )
-
-
-def holds_within(claim: Claim, inflate: Fraction) -> bool:
-    """The same for every gain within a relative distance."""
-    try:
-        return holds(claim, *judge(claim, inflate))
-    except NotProvedError:
-        return False
-
-
-def authority(claim: Claim, loop: Loop) -> list[tuple[Fraction, str, str]]:
+def authority(claim: Claim, loop: Loop, verdict: Impulse) -> list[tuple[Fraction, str, str]]:
     """Distance of each limited norm from its limit over the certified set; then the stroke."""
     result = []
     for limit in claim.limits:
-        norm = root(up(sum((loop.signal(s) ** 2 for s in limit["signals"]), Fraction(0))), True)
+        norm = root(up(sum((verdict.largest(s) ** 2 for s in limit["signals"]), Fraction(0))), True)
         result.append((limit["value"] - norm, str(limit["unit"]), str(limit["name"])))
     position = loop.nodes[claim.rows[0]["state"]].range
     unit = str(claim.rows[0]["unit"])
@@ -2862,34 +3303,27 @@ def authority(claim: Claim, loop: Loop) -> list[tuple[Fraction, str, str]]:
     return result
 
 
-def adaptation(claim: Claim, loop: Loop) -> Fraction:
-    """1 - T_s δσ keeps sampled θ̂ >= 0; δσ >= μ wherever θ̂ is part of V."""
-    slack = Fraction(1)
-    for i, gain in loop.gain.items():
-        slack = min(slack, 1 - claim.period * gain.delta[1] * gain.sigma[1])
-        if claim.kind == "composition" and claim.leak[i] > 0:
-            slack = min(slack, gain.delta[0] * gain.sigma[0] / claim.decay - 1)
-    return slack
+def adaptation(claim: Claim, loop: Loop, verdict: Impulse) -> tuple[Fraction, str]:
+    """1 - T_s δσ keeps sampled θ̂ >= 0; |φ̂| < Φ keeps every network from its bound. The smaller one, and what it is."""
+    slack = [(1 - claim.period * g.delta[1] * g.sigma[1], "theta stays 0 or more") for g in loop.gain.values()]
+    for i, size in zip(claim.networks, verdict.estimates(), strict=True):
+        state, capacity = claim.rows[i]["state"], loop.gain[i].capacity * (1 - ROUNDING)
+        used = percent(size / capacity, up=True) if capacity > 0 else "more than all"
+        slack.append(
+            (1 - size / capacity if capacity > 0 else Fraction(-1), f"phi of {state} uses {used} of its bound")
+        )
+    return min(slack)
 
 
 def vacuity(claim: Claim) -> Fraction:
-    """The smallest ratio of what must be inside to what holds it, turned into a margin."""
-    may_be_zero = [*claim.noise, *claim.initial]
-    positive = [claim.decay, claim.period, claim.accuracy, *claim.half_widths]
-    positive += [v for cell in claim.cells for v in (*cell.reach, *cell.start, *cell.shape)]
-    for name, values in {**claim.vectors, "input_bound": claim.input_bound}.items():
-        (may_be_zero if name == "leak" or (name, claim.kind) == ("input_bound", "composition") else positive).extend(
-            values
-        )
+    """1 where everything that must be positive is, and -1 elsewhere."""
+    may_be_zero = [*claim.noise, *claim.initial, claim.delay]
+    positive = [claim.period, claim.accuracy, *claim.half_widths, *claim.input_bound, *claim.network_bound]
     positive += [limit["value"] for limit in claim.limits] + [claim.stroke[1] - claim.stroke[0]]
-    if min(positive) <= 0 or min(may_be_zero) < 0:
-        return Fraction(-1)
-    if claim.kind == "sampled":
-        return Fraction(1)
-    return min(1 - initial / radius for initial, radius in zip(claim.initial, claim.half_widths, strict=True))
+    return Fraction(-1 if min(positive) <= 0 or min(may_be_zero) < 0 else 1)
 
 
-def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
+def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Impulse]:
     """Decide every obligation of the law; with the closed loop, and the verdicts on it."""
     made: list[Obligation] = []
 
@@ -2897,11 +3331,12 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
         made.append(decided(name, statement, margin, unit, remedy, member=claim.name, strict=strict))
 
     anew = "a certificate made for these gains and assumptions: run design again"
-    statement = "the box is not empty, holds the initial errors, and no limit is zero"
-    state("non-vacuity", statement, vacuity(claim), "1", "positive limits, and a box larger than the initial errors")
+    statement = "the box is not empty, and no limit is zero"
+    state("non-vacuity", statement, vacuity(claim), "1", "positive limits and bounds")
     if made[0].verdict != "proved":
         raise NotProvedError("the certificate is about an empty set (obligation non-vacuity)")
-    loop, verdict = judge(claim, ROUNDING)
+    loop = Loop(claim, ROUNDING)
+    verdict = Impulse(claim, loop)
     ranges = {row["state"]: loop.nodes[row["state"]].range for row in claim.rows}
     ranges |= {name: (-loop.signal(name), loop.signal(name)) for name in claim.inputs}
     effects = effects_of(claim, ranges)
@@ -2920,22 +3355,22 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     statement = "the reference is continuous to its acceleration, ends at rest and stays inside the stroke"
     unit = str(claim.rows[0]["unit"])
     state("reference", statement, inside, unit, f"waypoints {float(-inside):.3g} {unit} further inside the stroke")
-    name, statement, spare = verdict.contraction()
-    state(name, statement, spare, "1/s", anew, False)
+    statement = f"from period to period what a start makes shrinks at {downward(verdict.rate())} 1/s or more"
+    state("contraction", statement, verdict.contraction(), "1", anew)
+    delayed = f", {upward(claim.delay, 3)} s late" if claim.delay else ""
+    statement = f"the loop at {float(1 / claim.period):g} Hz{delayed} bears what is uncertain of it"
+    state("small gain", statement, verdict.small_gain(), "1", f"a faster rate, or {anew}")
     state("invariance", "no trajectory from the initial set leaves the assumed box", verdict.invariance(), "1", anew)
-    slack, unit, which = min(authority(claim, loop), key=lambda entry: entry[0] / scale(claim, entry[2]))
+    slack, unit, which = min(authority(claim, loop, verdict), key=lambda entry: entry[0] / scale(claim, entry[2]))
     used = percent(1 - slack / scale(claim, which), up=True)
     statement = f"every limit holds over the certified set; the tightest is {which}, of which {used} are used"
     state("authority", statement, slack, unit, f"a limit on {which} that is {float(-slack) * 1.001:.4g} {unit} wider")
-    statement, spare = verdict.sampling()
-    state("sampling", f"{statement} at {float(1 / claim.period):g} Hz", spare, "1", f"a faster rate, or {anew}")
-    statement = "sampled adaptation keeps theta >= 0, and delta sigma >= mu where theta is in V"
+    spare, statement = adaptation(claim, loop, verdict)
     faster = max(float(g.delta[1] * g.sigma[1]) for g in loop.gain.values())
-    state("adaptation", statement, adaptation(claim, loop), "1", f"a rate of at least {faster:.4g} Hz", False)
-    least = ROUNDING if holds(claim, loop, verdict) else Fraction(-1)
-    wider = (step for step in (Fraction(1, 1000), Fraction(1, 10000)) if holds_within(claim, step))
-    statement = "everything holds for the gains as decimal, float64 and float32"
-    state("rounding", statement, next(wider, least), "1", "what the other obligations need")
+    remedy = f"a rate of at least {faster:.4g} Hz, and a larger phi"
+    state("adaptation", f"no adaptive state reaches its bounds: {statement}", spare, "1", remedy, False)
+    statement = "everything here holds for the gains as decimal, float64 and float32"
+    state("rounding", statement, ROUNDING, "1", "what the other obligations need")
     error = verdict.ultimate(0)
     unit = str(claim.rows[0]["unit"])
     statement = f"from {upward(claim.transient, 6)} s on the tracking error is at most {milli(error, unit)}"
@@ -2952,9 +3387,12 @@ def scale(claim: Claim, name: str) -> Fraction:
     return next((limit["value"] for limit in claim.limits if limit["name"] == name), half)
 
 
-def uses(claim: Claim, loop: Loop) -> list[Use]:
+def uses(claim: Claim, loop: Loop, verdict: Impulse) -> list[Use]:
     """The share of every limit that is certified to be used at most."""
-    return [Use(claim.name, name, -below(slack / scale(claim, name) - 1)) for slack, _, name in authority(claim, loop)]
+    return [
+        Use(claim.name, name, -below(slack / scale(claim, name) - 1))
+        for slack, _, name in authority(claim, loop, verdict)
+    ]
 
 
 # --- member ---
@@ -2980,6 +3418,8 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     """Re-prove one member under its own assumptions."""
     entry = data["members"][which]
     claim = read(data, entry, coupled)
+    linked = coupled or data["study"]["controller"].get("observer") is not None
+    need(not (linked and 0 in claim.networks), "a first row with a load network is of a member that nothing links")
     consistent(data, entry, claim)
     follows(data, entry, claim, which)
     well_formed(claim)
@@ -2989,28 +3429,27 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     seen = number(data["validation"]["members"][claim.name]["largest_error"], "largest_error")
     need(seen >= 0, "largest_error must not be negative")
     rate = number(entry["certificate"]["envelope"]["rate"], "rate")
-    required = REQUIRED[data["study"]["controller"]["law"]][claim.kind]
+    required = REQUIRED[data["study"]["controller"]["law"]][entry["certificate"]["kind"]]
     need(sorted(o.name for o in made) == sorted(required), "the checker has not decided what the law needs")
     failed = ""
     wrong = [o for o in made if o.verdict != "proved"]
     if wrong:
         failed = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"
-    elif not rate <= claim.decay / (2 if claim.kind == "composition" else 1):
+    elif not rate <= verdict.rate():
         failed = "the envelope states a faster rate"
     elif not agree:
         failed = "the golden vectors do not follow from the gains and the law"
     elif seen > claim.half_widths[0]:
         failed = "the recorded simulation leaves the certified envelope"
-    tube = tube_of(claim, verdict) if isinstance(verdict, Held) and len(claim.rows) > accelerating(claim) else None
-    return Member(claim.name, claim, loop, made, tube, verdict.ultimate(0), uses(claim, loop), failed)
+    tube = tube_of(claim, verdict) if len(claim.rows) > accelerating(claim) else None
+    return Member(claim.name, claim, loop, made, tube, verdict.ultimate(0), uses(claim, loop, verdict), failed)
 
 
-def tube_of(claim: Claim, verdict: Held) -> tuple[Fraction, Fraction, Fraction]:
+def tube_of(claim: Claim, verdict: Impulse) -> tuple[Fraction, Fraction, Fraction]:
     """Bounds on the deviations of position, speed and acceleration for all t; no position where a speed comes first."""
     row = accelerating(claim)
-    rate = max(period.speeds(period.cell.start)[row] for period in verdict.periods)
     position = claim.half_widths[0] if row else Fraction(0)
-    return position, claim.half_widths[row], up(rate * claim.half_widths[row] / claim.period)
+    return position, claim.half_widths[row], verdict.speed(row)
 
 
 def accelerating(claim: Claim) -> int:
@@ -3094,8 +3533,10 @@ class Coupling:
         self.foreseeing = "mechanics" in study["controller"]["modelling"]
         for member in members:
             claim = member.claim
-            need(bool(claim.feedforward) == self.foreseeing, "what the members foresee is not what the law models")
+            need(set(claim.feedforward) == set(claim.disturbances), "a member of a coupling has one load, with a rate")
             need(len(claim.disturbances) == 1, "a member of a coupling has one disturbance, its load")
+            known = not set(claim.feedforward) & set(claim.nominal)
+            need(known == self.foreseeing, "what the members foresee is not what the law models")
         self.load = [next(iter(member.claim.disturbances)) for member in members]
         self.guarantee = [guarantee_of(data, member.name) for member in members]
         self.stated = number(entry["envelope"]["output"], "the bound on the output")
@@ -3212,12 +3653,10 @@ class Coupling:
         """How much room the assumptions of a member leave to its load on a slice."""
         claim = self.members[i].claim
         assumed = claim.disturbances[self.load[i]]
-        known = claim.feedforward.get(self.load[i])
-        if known is not None:
-            foreseen = all(o[0] <= a[0] and a[1] <= o[1] for a, o in ((load, known[0]), (rate, known[1])))
-            foreseen = foreseen and known[1][0] <= 0 <= known[1][1]  # after its end the reference rests
-            load = ZERO if foreseen else symmetric(2 * magnitude(assumed))
-        inner = add(load, symmetric(size))
+        known = claim.feedforward[self.load[i]]
+        foreseen = all(o[0] <= a[0] and a[1] <= o[1] for a, o in ((load, known[0]), (rate, known[1])))
+        foreseen = foreseen and known[1][0] <= 0 <= known[1][1]  # after its end the reference rests
+        inner = add(ZERO if foreseen else symmetric(2 * magnitude(assumed)), symmetric(size))
         return min(inner[0] - assumed[0], assumed[1] - inner[1]) / max(magnitude(assumed), Fraction(1, 10**9))
 
     def _well_posed(self) -> Fraction:

@@ -7,16 +7,15 @@ import numpy as np
 
 from stability import (
     Bounds,
-    Certificate,
     Composition,
     Failure,
     Gains,
+    Impulse,
     Interval,
     LoopModel,
     Row,
-    Sampled,
     certify,
-    certify_sampled,
+    certify_impulse,
     checker,
     from_casadi,
 )
@@ -76,25 +75,25 @@ def certify_chain(bandwidths: tuple[float, ...], **assumed: float) -> Compositio
     return certify(integrator_chain(order, unit=unit), chain_bounds(order, **assumed), gains, limit)
 
 
-def certify_sampled_chain(
+def certify_impulse_chain(
     bandwidths: tuple[float, ...], *, refine: bool = False, **assumed: float
-) -> Sampled | Failure:
-    """The same by the exact zero-order-hold map."""
+) -> Impulse | Failure:
+    """The same by its impulse responses."""
     order, unit = len(bandwidths), assumed.get("unit", 1.0)
     limit = unit * np.array([0.05, 1.0, 100.0])[:order]
     gains = tuple(Gains(beta=2.0 * w) for w in bandwidths)
-    return certify_sampled(
+    return certify_impulse(
         integrator_chain(order, unit=unit), chain_bounds(order, **assumed), gains, limit, refine=refine
     )
 
 
 def fraction(value: float) -> Fraction:
     """A short rational near a float."""
-    return Fraction(f"{value:.9e}")
+    return Fraction(f"{value:.8e}")
 
 
 def claim_of(
-    model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], found: Certificate, *, accuracy: float = 1e3,
+    model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], found: Impulse, *, accuracy: float = 1e3,
     limit: float = 1e9,
 ) -> Claim:  # fmt: skip
     """What the checker would read from a file about this certificate; generous limits."""
@@ -106,9 +105,6 @@ def claim_of(
         data = expression.to_data()  # type: ignore[attr-defined]
         return {"operations": data["operations"], "outputs": data["outputs"]}
 
-    composed = isinstance(found, Composition)
-    sampled = found if isinstance(found, Sampled) else None
-    smallest = 1e-6 * found.half_widths[-1] * gains[-1].beta if composed else 0.0
     return Claim(
         name="",
         rows=model.to_data()["rows"],
@@ -122,28 +118,31 @@ def claim_of(
         reference=[pair(i) for i in bounds.reference],
         noise=[Fraction(v) for v in bounds.noise],
         initial=[Fraction(v) for v in bounds.initial],
-        period=Fraction(bounds.period) if bounds.period else Fraction(1, 10**9),
-        gains=[tuple(Fraction(v) for v in (g.beta, g.epsilon, g.delta, g.sigma)) for g in gains],
-        kind="composition" if composed else "sampled",
-        decay=fraction(found.decay),
-        vectors={
-            name: [fraction(v) for v in getattr(found, name)] for name in checker.VECTORS["composition"] if composed
-        },
-        split=list(sampled.split) if sampled else [],
+        period=Fraction(bounds.period),
+        delay=Fraction(bounds.delay),
+        gains=[
+            tuple(Fraction(v) for v in (g.beta, g.epsilon, g.delta, g.sigma, g.gamma, g.capacity, g.preload))
+            for g in gains
+        ],
+        force=[[fraction(v) for v in row] for row in found.force],
+        drive=[[fraction(v) for v in row] for row in found.drive],
+        split=list(found.split),
         cells=[
-            Cell(
-                [[fraction(v) for v in row] for row in cell.transform],
-                *([fraction(v) for v in getattr(cell, name)] for name in checker.VECTORS["sampled"]),
-            )
-            for cell in (sampled.cells if sampled else ())
+            Cell([[fraction(v) for v in row] for row in c.columns], list(c.blocks), list(c.groups), fraction(c.growth))
+            for c in found.cells
         ],
         half_widths=[fraction(v) for v in found.half_widths],
-        input_bound=[fraction(max(v, smallest)) for v in found.input_bound],
-        ultimate=[fraction(v * (1 + 1e-5)) for v in found.ultimate],
+        input_bound=[fraction(v) for v in found.input_bound],
+        demand=[(fraction(a), fraction(b)) for a, b in zip(found.box.low, found.box.high, strict=True)],
+        middle=[fraction(v) for v in found.box.middle],
+        network_bound=[fraction(v) for v in found.box.network_bound],
+        ultimate=[fraction(v * (1 + 5e-4)) for v in found.ultimate],
         limits=[{"name": "input", "signals": list(model.inputs), "value": Fraction(limit), "unit": "1"}],
         stroke=(Fraction(-(10**12)), Fraction(10**12)),
         accuracy=Fraction(accuracy),
         transient=Fraction(bounds.transient),
+        rest=(Fraction(bounds.rest[0]), Fraction(bounds.rest[1])),
+        feedforward={name: (pair(v), pair(rate)) for name, (v, rate) in bounds.feedforward.items()},
     )
 
 

@@ -41,7 +41,7 @@ def run(path: Path, budget: int, seed: int, *, jobs: int = 1, resume: bool = Fal
     with claimed(path):
         with bar() as progress:
             problem, found = attacked(document, budget, seed, progress, jobs=jobs, kept=kept, resume=resume)
-        finished, verdict = prove(stored(document, found))
+        finished, verdict = prove(stored(problem, document, found))
         if verdict.status != PROVED:
             raise DefectError(f"the file is no longer proved with its witness: {verdict.message}")
         # in this order: a file that is attacked already must not be attacked again by a resumed run

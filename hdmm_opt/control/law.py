@@ -25,6 +25,7 @@ class GainSpec:
         meaning: One line.
         default: Value where a study leaves it out; None where it must not.
         zero: Whether it may be zero.
+        signed: Whether it may be negative too.
         low, high: Range in which a law without a study's range is searched; None where a study gives it.
     """
 
@@ -33,6 +34,7 @@ class GainSpec:
     meaning: str
     default: float | None = None
     zero: bool = False
+    signed: bool = False
     low: float | None = None
     high: float | None = None
 
@@ -55,8 +57,8 @@ class Law(Protocol):
         """Number of discrete states; all start at zero but what `start` says."""
         ...
 
-    def start(self, x: Sequence[float]) -> list[float]:
-        """Discrete states for a first measurement. Shape (states,)."""
+    def start(self, x: Sequence[float], gains: Sequence[float]) -> list[float]:
+        """Discrete states for a first measurement and gains. Shape (states,)."""
         ...
 
     def step(self, x: Any, r: Any, z: Any, gains: Any, nominal: Any, load: Any, period: float) -> Any:

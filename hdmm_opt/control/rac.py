@@ -1,12 +1,14 @@
 """Robust adaptive control (RAC) for strict-feedback plants: one definition for any number of subsystems.
 
-    Q_i = x_i - target_i,   κ_i = -(β_i + ε_i θ̂_i) Q_i / 2 + m_i,   θ̂_i' = -δ_i σ_i θ̂_i + ε_i δ_i Q_i² / 2
+    Q_i = x_i - target_i,   κ_i = -(β_i + ε_i θ̂_i) Q_i / 2 - φ̂_i + m_i,   θ̂_i' = -δ_i σ_i θ̂_i + ε_i δ_i Q_i² / 2
+    φ̂_i <- φ̂_i + T γ_i Q_i, kept within ±Φ_i, and left where the limited input would be pushed further into its limit
 
 The target of a row is the reference, zero, or the virtual control κ of another row; the input is the κ of the last
 row. The modelling terms m_i are zero in the model-free law, but for m_1 = x_1d' where x_1' = x_2, a position. The
-model-based law fills them in; see `modelling.py`.
+model-based law fills them in; see `modelling.py`. φ̂_i is the load network of P-4: it finds the demand that nothing else
+covers, a load above all. γ_i = 0 switches it off.
 
-Source: Heydari Shahna (2025), ch. 4, and P-1, P-4; sampled form derived here.
+Source: Heydari Shahna (2025), ch. 4, and P-1, P-4; sampled form and load network derived here.
 """
 
 from __future__ import annotations
@@ -29,7 +31,12 @@ KINDS: dict[str, tuple[str, float | None]] = {
     "epsilon": ("adaptation gain", 0.0),
     "delta": ("adaptation rate", 1.0),
     "sigma": ("leakage of the adaptation", 1.0),
+    "gamma": ("gain of the load network", 0.0),
+    "phi": ("largest estimate of the load network", None),
+    "preload": ("estimate of the load network at the start", None),
 }
+#: Gains of a row.
+COUNT = len(KINDS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,13 +90,14 @@ class RAC:
 
     @property
     def schema(self) -> tuple[GainSpec, ...]:
-        """β, ε, δ and σ of each controlled row."""
+        """β, ε, δ, σ, γ, Φ and φ̂(0) of each controlled row."""
         found = []
         for k, row in enumerate(self.controlled):
             state = self.plant.states[row]
             for kind, (meaning, default) in KINDS.items():
                 found.append(GainSpec(
-                    name=f"{kind}_{k + 1}", unit=self._unit(row, kind), default=default, zero=kind == "epsilon",
+                    name=f"{kind}_{k + 1}", unit=self._unit(row, kind), default=default,
+                    zero=kind not in ("beta", "delta", "sigma"), signed=kind == "preload",
                     meaning=f"{meaning} of subsystem {k + 1} ({state})",
                 ))  # fmt: skip
         return tuple(found)
@@ -101,7 +109,11 @@ class RAC:
         control = followers[0] if followers else self.plant.input_unit
         if kind in ("delta", "sigma"):
             return "1" if kind == "delta" else "1/s"
+        if kind in ("phi", "preload"):
+            return control
         ratio = f"({control})/({own})"
+        if kind == "gamma":
+            return f"{ratio}/s"
         return ratio if kind == "beta" else f"sqrt({ratio}/s)/({own})"
 
     def derived(self, rate: float, initial: Sequence[float]) -> dict[str, tuple[float, float]]:
@@ -122,7 +134,11 @@ class RAC:
             scale = 2 * plant.inertia_over_gain(i)
             low, high = scale * fastest * NARROWEST, scale * fastest
             followers = [plant.states[j] for j, target in enumerate(plant.targets) if target == i]
-            limit = own.get(followers[0] if followers else plant.inputs[plant.input_map.index(i)])
+            driven = [plant.inputs[plant.input_map.index(i)]] if i in plant.input_map else followers[:1]
+            limit = own.get(driven[0]) if driven else None
+            largest = next((entry.value for entry in plant.limits if set(driven[:1]) & set(entry.signals)), 0.0)
+            found[f"phi_{k + 1}"] = (largest, largest)
+            found[f"preload_{k + 1}"] = (0.0, 0.0)
             if limit is not None and initial[i] > 0:
                 high = max(min(high, 2 * limit / initial[i]), 2 * low)
             found[f"beta_{k + 1}"] = (float(f"{low:.3g}"), float(f"{high:.3g}"))
@@ -135,36 +151,50 @@ class RAC:
 
     @property
     def states(self) -> int:
-        """An adaptive scalar for each controlled row."""
-        return len(self.controlled)
+        """An adaptive scalar and a load network for each controlled row."""
+        return 2 * len(self.controlled)
 
-    def start(self, x: Sequence[float]) -> list[float]:
-        """All adaptive scalars start at zero."""
-        return [0.0] * self.states
+    def start(self, x: Sequence[float], gains: Sequence[float]) -> list[float]:
+        """All adaptive scalars start at zero, all load networks at their preload."""
+        return [0.0] * len(self.controlled) + [gains[k] for k in range(COUNT - 1, len(self.schema), COUNT)]
 
     def rows_of(self, values: Sequence[float]) -> tuple[Gains, ...]:
         """A vector of gains as the prover takes them."""
-        return tuple(Gains(**dict(zip(KINDS, values[k : k + 4], strict=True))) for k in range(0, len(values), 4))
+        names = [{"phi": "capacity"}.get(kind, kind) for kind in KINDS]
+        rows = (values[k : k + COUNT] for k in range(0, len(values), COUNT))
+        return tuple(Gains(**dict(zip(names, row, strict=True))) for row in rows)
 
     def step(self, x: Any, r: Any, z: Any, gains: Any, nominal: Any, load: Any, period: float) -> Any:
         """One control period, as expressions; arguments as in `control/law.py`.
 
         Returns:
-            (u, θ̂ after the period, Q): inputs inside the amplitude limit, shape (m,); shape (k,); errors of the
+            (u, θ̂ and φ̂ after the period, Q): inputs inside the amplitude limit, shape (m,); shape (2 k,); errors of the
             controlled rows, shape (k,).
         """
         import casadi as ca
 
         virtual, errors = self.virtual_controls(x, r, z, gains, nominal, load)
-        adapted = []
-        for k, error in enumerate(errors):
-            _, epsilon, delta, sigma = (gains[4 * k + column] for column in range(4))
+        asked = ca.vertcat(*(virtual[row] for row in self.plant.input_map))
+        u = limited(self.plant, asked)
+        adapted, learned, count = [], [], len(errors)
+        for k, (row, error) in enumerate(zip(self.controlled, errors, strict=True)):
+            _, epsilon, delta, sigma, gamma, phi, _ = (gains[COUNT * k + column] for column in range(COUNT))
             adapted.append(z[k] + period * (epsilon * delta * error**2 / 2 - delta * sigma * z[k]))
-        u = ca.vertcat(*(virtual[row] for row in self.plant.input_map))
-        return limited(self.plant, u), ca.vertcat(*adapted), ca.vertcat(*errors)
+            own = self._input_of(row)
+            # an increment lowers κ, and with it the input at the end of the chain
+            further = -error * asked[own] > 0
+            held = ca.logic_and(ca.fabs(asked[own]) > ca.fabs(u[own]), further)
+            estimate = z[count + k] + ca.if_else(held, 0, period * gamma * error)
+            learned.append(ca.fmin(ca.fmax(estimate, -phi), phi))
+        return u, ca.vertcat(*adapted, *learned), ca.vertcat(*errors)
+
+    def _input_of(self, row: int) -> int:
+        """The input at the end of the chain that a row begins."""
+        following = next((j for j in self.controlled if self.plant.targets[j] == row), None)
+        return self.plant.input_map.index(row) if following is None else self._input_of(following)
 
     def virtual_controls(
-        self, x: Any, r: Any, theta: Any, gains: Any, nominal: Any, load: Any
+        self, x: Any, r: Any, z: Any, gains: Any, nominal: Any, load: Any
     ) -> tuple[dict[int, Any], list[Any]]:
         """κ_i by row, and Q_i of the controlled rows, before the amplitude limit; arguments as in `step`."""
         terms = self.terms(x, r, nominal, load)
@@ -174,7 +204,9 @@ class RAC:
             target = self.rows[i].target
             goal = r[0] if target == "reference" else 0 if target == "zero" else virtual[int(target)]
             errors.append(x[i] - goal)
-            virtual[i] = -(gains[4 * k] + gains[4 * k + 1] * theta[k]) * errors[-1] / 2 + terms[k]
+            first, count = COUNT * k, len(self.controlled)
+            proportional = -(gains[first] + gains[first + 1] * z[k]) * errors[-1] / 2
+            virtual[i] = proportional + terms[k] - z[count + k]
         return virtual, errors
 
     def loop_model(self) -> LoopModel:

@@ -29,7 +29,10 @@ def golden_vectors(loop: Loop, gains: GainSet) -> dict[str, list[dict[str, Any]]
             foreseen = [shared[tick, 4 * n + k]] if problem.foreseeing else []
             load = foreseen or [member.bounds.nominal[name] for name in member.plant.disturbances]
             u, following, _ = law(x, r, z, list(gains[member.name]), nominal, load)
-            entry = {"x": x, "r": r, "theta": z, "u": np.array(u).ravel(), "theta_next": np.array(following).ravel()}
+            theta, phi = np.split(z, 2)
+            theta_next, phi_next = np.split(np.array(following).ravel(), 2)
+            entry = {"x": x, "r": r, "theta": theta, "phi": phi, "u": np.array(u).ravel(), "theta_next": theta_next,
+                     "phi_next": phi_next}  # fmt: skip
             if foreseen:
                 entry["load"] = np.array(foreseen)
             vectors.append({key: [float(v) for v in values] for key, values in entry.items()})

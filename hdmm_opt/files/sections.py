@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from stability import Certificate, Composition, Sampled, checker
 from stability.networks.contracts import Contract
 from stability.networks.coupling import Tube
 from stability.networks.observer import sampled_bounds
@@ -25,7 +24,9 @@ DIGITS = 9
 #: Guarantees are written with so much room that rounding them does not break them.
 ROOM = 1 + 1e-6
 #: Room of a stated bound on a member's error, and on the output's, over what was found: the checker rounds outwards.
-ULTIMATE, OUTPUT = 1e-5, 1e-4
+ULTIMATE, OUTPUT = 5e-4, 6e-4
+#: Share of a rate of decay that a file states: the checker's logarithm is rounded down.
+RATE = 0.999
 
 
 def reference_data(
@@ -91,34 +92,34 @@ def assumptions_data(member: Member) -> list[dict[str, Any]]:
 def certificate_data(contract: Contract) -> dict[str, Any]:
     """The certificate of a member, with what it guarantees where it is linked."""
     found = contract.certificate
-    composed = isinstance(found, Composition)
     data: dict[str, Any] = {
-        "kind": "composition" if composed else "sampled",
-        "decay": short(found.decay),
+        "kind": "impulse",
         "half_widths": [short(v, up=True) for v in found.half_widths],
         "input_bound": [short(v, up=True) for v in found.input_bound],
+        "networks": [
+            {"row": state, "low": short(low), "high": short(high), "middle": short(middle),
+             "bound": short(bound, up=True)}
+            for state, low, high, middle, bound in zip(
+                found.networks, found.box.low, found.box.high, found.box.middle, found.box.network_bound, strict=True
+            )
+        ],
+        "force": _matrix(found.force), "drive": _matrix(found.drive), "split": list(found.split),
+        "cells": [
+            {"columns": _matrix(cell.columns), "blocks": list(cell.blocks), "groups": list(cell.groups),
+             "growth": short(cell.growth)}
+            for cell in found.cells
+        ],
         "envelope": {
-            "rate": short((0.4999999 if composed else 0.9999999) * found.decay),
-            "ultimate": [short(v * (1 + ULTIMATE), up=True) for v in found.ultimate],
+            "rate": short(RATE * found.decay), "ultimate": [short(v * (1 + ULTIMATE), up=True) for v in found.ultimate]
         },
-    }
+    }  # fmt: skip
     if contract.guarantee is not None:
         data["guarantee"] = _tube(contract.guarantee)
-    return data | _vectors(found, data["kind"])
+    return data
 
 
-def _vectors(found: Certificate, kind: str) -> dict[str, Any]:
-    vectors = checker.VECTORS[kind]
-    if not isinstance(found, Sampled):
-        return {name: [short(v) for v in getattr(found, name)] for name in vectors}
-    cells = [
-        {
-            "transform": [[short(v) for v in row] for row in cell.transform],
-            **{name: [short(v) for v in getattr(cell, name)] for name in vectors},
-        }
-        for cell in found.cells
-    ]
-    return {"split": list(found.split), "cells": cells}
+def _matrix(rows: np.ndarray) -> list[list[str]]:
+    return [[short(v) for v in row] for row in rows]
 
 
 def _tube(tube: Tube) -> list[str]:

@@ -10,7 +10,7 @@ from ..problem import Problem
 from ..problem.problem import Contracts
 from ..simulation import Figures, Scenario
 from ..simulation.figures import plain
-from ..simulation.requirements import reached, required
+from ..simulation.requirements import figure_of, reached, required
 from .read import above, certified_of, ultimate_of
 from .result import Validation, Witness
 from .sections import stated_output, stated_ultimate
@@ -73,9 +73,13 @@ def contradiction(document: dict[str, Any], witness: Witness) -> str | None:
     return None
 
 
-def stored(document: dict[str, Any], witness: Witness) -> dict[str, Any]:
+def stored(problem: Problem, document: dict[str, Any], witness: Witness) -> dict[str, Any]:
     """A gain file's document with the witness as its worst case, where it is worse than the one there."""
     shown = dict(document["validation"])
+    shown["requirements"] = [
+        {**row, "simulated": max(row["simulated"] or 0.0, figure_of(problem, row["name"], witness.figures))}
+        for row in shown["requirements"]
+    ]
     late = witness.figures.maximum_error_m
     shown["simulated_runs"] = shown.get("simulated_runs", 0) + witness.runs
     shown["largest_error_m"] = max(shown["largest_error_m"], witness.largest_error)

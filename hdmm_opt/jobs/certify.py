@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stability import Certificate, Composition, Failure, certify, certify_sampled, deviation_rows
-from stability.certificates import quadratic
+from stability import Certificate, Composition, Failure, Impulse, certify, certify_impulse
 from stability.networks.contracts import Contract, refined, solve_contracts
 from stability.networks.observer import SampledObserver
 
@@ -28,49 +27,26 @@ LONGEST = 64
 STEPS, LINKED_STEPS = 12, 4
 
 
-def contracts_of(problem: Problem, gains: GainSet, *, composed: bool = False) -> Contracts | Failure:
-    """Proofs of all members at their control periods, or why there are none.
-
-    Args:
-        problem: The problem.
-        gains: Gains of all members.
-        composed: Whether to look for a composition where a member that nothing links has no sampled certificate, or
-            where it breaks a limit; that takes long.
-    """
+def contracts_of(problem: Problem, gains: GainSet, *, refine: bool = False) -> Contracts | Failure:
+    """Proofs of all members at their control periods, or why there are none; refined ones where nothing links them."""
     if problem.linked:
         return solve_contracts(problem.subsystems(gains), problem.assume)
     found: Contracts = {}
     for member in problem.members:
-        values = gains[member.name]
-        one = certificate(member, values) if composed else sampled(member, values)
+        one = certificate(member, gains[member.name], refine=refine)
         if isinstance(one, Failure):
             return one
         found[member.name] = Contract(guarantee=None, reached=None, bounds=member.bounds, certificate=one)
     return found
 
 
-def sampled(member: Member, values: Values, *, refine: bool = False) -> Certificate | Failure:
-    """The sampled certificate of a member alone."""
-    return certify_sampled(member.model, member.bounds, member.gains(values), member.box, refine=refine)
-
-
-def certificate(member: Member, values: Values, *, period: float | None = None) -> Certificate | Failure:
-    """A certificate of a member alone at its control period, or at another one (0: a continuous law).
-
-    The sampled certificate comes first; the composition is looked for where there is none, and for a continuous law.
-    """
-    if period is not None:
-        member = member.under(replace(member.bounds, period=period))
-    if member.bounds.period == 0:
-        return composition(member, values)
-    found = sampled(member, values)
-    if isinstance(found, Certificate):
-        return found
-    return min((found, composition(member, values)), key=lambda c: _rank(member, c, values))
+def certificate(member: Member, values: Values, *, refine: bool = False) -> Impulse | Failure:
+    """The certificate of a member alone."""
+    return certify_impulse(member.model, member.bounds, member.gains(values), member.box, refine=refine)
 
 
 def composition(member: Member, values: Values) -> Composition | Failure:
-    """The better composition certificate of those without and with θ̂ in V."""
+    """The gain condition of a member's continuous law without load networks, with or without θ̂ in V."""
     gains = member.gains(values)
     plain = certify(member.model, member.bounds, gains, member.box)
     if not any(g.epsilon > 0 for g in gains):
@@ -95,11 +71,11 @@ def _rank(member: Member, found: Certificate | Failure, values: Values) -> tuple
 
 @dataclass(frozen=True, kw_only=True)
 class Strongest:
-    """The best proofs of some gains, and what the other kinds give.
+    """The best proofs of some gains.
 
     Attributes:
         contracts: The best of each member, or why there are none.
-        notes: A line for each member: which kind was taken, and what the others give.
+        notes: A line for each member: what refining the certificate brought.
     """
 
     contracts: Contracts | Failure
@@ -107,68 +83,30 @@ class Strongest:
 
 
 def strongest(problem: Problem, gains: GainSet) -> Strongest:
-    """Search all kinds of certificates that a gain file can carry, refined ones too.
-
-    A member that nothing links takes the kind with the smaller bound among those that meet its limits; a linked member
-    keeps the sampled kind, which gives a guarantee.
-    """
-    if problem.linked:
-        found = contracts_of(problem, gains)
-        if isinstance(found, Failure):
-            return Strongest(contracts=found, notes=())
-        better = {
-            name: refined(name, own, found[name]) for name, own in problem.subsystems(gains).items()
-        }  # fmt: skip
-        notes = tuple(_refinement(problem.member(name), found[name], better[name]) for name in better)
-        if violation(problem, better, gains) > 0 and violation(problem, found, gains) == 0:
-            better = found
-        return Strongest(contracts=better, notes=notes)
-    contracts: Contracts = {}
-    notes = []
-    for member in problem.members:
-        values = gains[member.name]
-        plain = sampled(member, values)
-        if isinstance(plain, Certificate):
-            plain = min((plain, sampled(member, values, refine=True)), key=lambda c: _rank(member, c, values))
-        composed = composition(member, values)
-        best = min((plain, composed), key=lambda c: _rank(member, c, values))
-        if isinstance(best, Failure):
-            return Strongest(contracts=best, notes=())
-        notes.append(_compared(member, values, plain, composed, best))
-        contracts[member.name] = Contract(guarantee=None, reached=None, bounds=member.bounds, certificate=best)
-    return Strongest(contracts=contracts, notes=tuple(notes))
+    """Proofs with refined certificates, where those are tighter and keep what the members guarantee."""
+    found = contracts_of(problem, gains)
+    if isinstance(found, Failure):
+        return Strongest(contracts=contracts_of(problem, gains, refine=True), notes=())
+    better: Contracts = {}
+    for name, own in problem.subsystems(gains).items():
+        if problem.linked:
+            better[name] = refined(name, own, found[name])
+            continue
+        member, finer = problem.member(name), certificate(problem.member(name), gains[name], refine=True)
+        taken = min((found[name].certificate, finer), key=lambda c: _rank(member, c, gains[name]))
+        assert isinstance(taken, Impulse)
+        better[name] = replace(found[name], certificate=taken)
+    notes = tuple(_refinement(problem.member(name), found[name], better[name]) for name in better)
+    if violation(problem, better, gains) > 0 and violation(problem, found, gains) == 0:
+        better = found
+    return Strongest(contracts=better, notes=notes)
 
 
 def _refinement(member: Member, plain: Contract, better: Contract) -> str:
     unit = member.plant.state_units[0]
     sizes = [1e3 * float(c.certificate.ultimate[0]) for c in (plain, better)]
-    return f"{member.name}: sampled certificate, {sizes[1]:.4g} m{unit} (not refined: {sizes[0]:.4g} m{unit})"
-
-
-def _compared(
-    member: Member, values: Values, plain: Certificate | Failure, composed: Composition | Failure, taken: Certificate
-) -> str:
-    if isinstance(taken, Composition):
-        return f"composition certificate, {_told(member, taken)} (sampled: {_told(member, plain)})"
-    others = (
-        f"composition: {_told(member, composed)}, quadratic, at the samples: {quadratic_bound(member, values, taken)}"
-    )
-    return f"sampled certificate, {_told(member, taken)} ({others})"
-
-
-def _told(member: Member, found: Certificate | Failure) -> str:
-    unit = member.plant.state_units[0]
-    return found.reason if isinstance(found, Failure) else f"{1e3 * float(found.ultimate[0]):.4g} m{unit}"
-
-
-def quadratic_bound(member: Member, values: Values, found: Certificate) -> str:
-    """The ultimate bound at the samples by one ellipsoid for the exact map, over the box of a sampled certificate."""
-    rows = deviation_rows(member.model, member.bounds, member.gains(values), found.half_widths, found.input_bound)
-    inclusion = quadratic.from_period(rows, member.bounds.period, found.half_widths)
-    ellipsoid = quadratic.search(inclusion, np.eye(len(found.half_widths))[0], found.half_widths)
-    squared = None if ellipsoid is None else quadratic.prove(inclusion, ellipsoid)
-    unit = member.plant.state_units[0]
-    return "none" if squared is None else f"{1e3 * math.sqrt(squared):.4g} m{unit}"
+    count = len(better.certificate.cells)
+    return f"{member.name}: {sizes[1]:.4g} m{unit} with the inertias in {count} cells, {sizes[0]:.4g} m{unit} in one"
 
 
 def longest_period(problem: Problem, gains: GainSet, *, proved: bool = False) -> float:
@@ -180,7 +118,7 @@ def longest_period(problem: Problem, gains: GainSet, *, proved: bool = False) ->
 
     def good(period: float) -> bool:
         slower = at_period(problem, period)
-        return slower is not None and violation(slower, contracts_of(slower, gains, composed=True), gains) == 0.0
+        return slower is not None and violation(slower, contracts_of(slower, gains), gains) == 0.0
 
     steps = LINKED_STEPS if problem.linked else STEPS
     low = high = problem.period

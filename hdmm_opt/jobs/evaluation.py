@@ -28,23 +28,22 @@ COST_SCENARIOS = 4
 OBJECTIVES = ("rms error", "certified bound", "effort")
 
 
-def make_evaluator(study: Study, window: Window, composed: bool = False) -> Callable[[Sequence[Array]], list[Outcome]]:
+def make_evaluator(study: Study, window: Window) -> Callable[[Sequence[Array]], list[Outcome]]:
     """The outcomes of a batch of points of a window as a pure function.
 
     Args:
         study: The study.
         window: Where the points lie.
-        composed: Whether to look for a composition where there is no sampled certificate; that takes long.
     """
     problem = assemble(study)
     loop = Loop(problem)
-    return lambda points: evaluate(loop, [problem.at(window.at(point)) for point in points], composed=composed)
+    return lambda points: evaluate(loop, [problem.at(window.at(point)) for point in points])
 
 
-def evaluate(loop: Loop, candidates: Sequence[GainSet], *, composed: bool = False) -> list[Outcome]:
+def evaluate(loop: Loop, candidates: Sequence[GainSet], *, refine: bool = False) -> list[Outcome]:
     """The outcomes of some gains; infeasible ones are never simulated, the others together."""
     problem, chosen = loop.problem, cost_scenarios(loop.problem)
-    found = [contracts_of(problem, gains, composed=composed) for gains in candidates]
+    found = [contracts_of(problem, gains, refine=refine) for gains in candidates]
     excess = [violation(problem, entry, gains) for entry, gains in zip(found, candidates, strict=True)]
     proved = [i for i, entry in enumerate(found) if not isinstance(entry, Failure) and not excess[i] > 0]
     runs = [Run(gains=candidates[i], scenario=scenario) for i in proved for scenario in chosen]

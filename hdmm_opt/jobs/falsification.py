@@ -17,7 +17,7 @@ from ..errors import InvalidInputError
 from ..files.result import Witness
 from ..files.state import State
 from ..problem import GainSet
-from ..simulation import Loop, Run, Scenario, within_assumptions
+from ..simulation import Loop, Run, Scenario, rated, within_assumptions
 from ..simulation.scenario import Course
 from .worst_case import EDGE, uncertain
 
@@ -95,7 +95,8 @@ class _Attack:
         self.asked = 0
 
     def errors(self, tried: Sequence[Scenario]) -> list[float]:
-        """Run scenarios together; their largest errors after the transient."""
+        """Run scenarios together, disturbances no faster than assumed; their largest errors after the transient."""
+        tried = [rated(self.problem, scenario) for scenario in tried]
         if self.asked == len(self.answers):
             found = self.loop.figures([Run(gains=self.gains, scenario=s) for s in tried], jobs=self.jobs)
             self.answers.append([

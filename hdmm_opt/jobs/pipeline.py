@@ -26,6 +26,7 @@ from ..study import Study
 from .certify import longest_period, strongest
 from .falsification import falsify
 from .options import Effort, Options, Progress, effort_of
+from .polish import polished
 from .refusal import refused
 from .search import search
 from .start import Tuned, starting_point
@@ -59,6 +60,9 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
         progress.stage(f"gains: {study.tuning.method}")
         budget = (effort.population, effort.iterations)
         tuned = search(problem, tuned, study.tuning.method, budget, seed, options, state, progress)
+        if options.full:
+            progress.stage("gains: pattern search with refined proofs")
+            tuned = polished(problem, tuned, progress)
     progress.stage("proof")
     best = strongest(problem, tuned.gains)
     return finished(problem, tuned, best.contracts, effort, options, state, progress, begun, notes=best.notes)
@@ -102,7 +106,7 @@ def finished(
         broken = contradiction(document, witness)
         if broken is not None:
             raise DefectError(f"{broken}; no file was written, please report this study")
-        document = stored(document, witness)
+        document = stored(problem, document, witness)
     progress.stage("exact check")
     spent = {"evaluations": tuned.evaluations, "search_runs": tuned.runs}
     made = provenance(seed, options.jobs, "full" if options.full else "quick", spent, begun)

@@ -18,7 +18,7 @@ from ..problem.margins import Margin, margins, member_margins
 from ..problem.problem import Contracts
 from ..problem.verdict import Verdict
 from ..simulation import Figures, Loop, Run, Scenario, scenarios, within_assumptions
-from .certify import certificate, longest_period
+from .certify import composition, longest_period
 from .demand import demand_period, largest_demand, resting_demand, terms_that_help
 from .shrinking import uncertainty
 from .validation import shown_scenarios
@@ -73,7 +73,9 @@ def _alone(problem: Problem, gains: GainSet) -> list[Verdict]:
     for member in problem.members:
         own = member.under(still[member.name])
         values = gains[member.name]
-        continuous = certificate(own, values, period=0.0)
+        continuous = composition(own, values)
+        if isinstance(continuous, Certificate) and any(g.gamma > 0 for g in own.gains(values)):
+            continue  # it is of the law without load networks: what it bounds is not what this one does
         found = [*_authority(problem, own, gains, continuous), *_conditions(problem, own, continuous)]
         if found:
             return [replace(v, member=member.name if several else "") for v in found]

@@ -61,7 +61,7 @@ def search(
         progress.update(now.evaluations / allowed.evaluations, text)
 
     window = Window.around(problem, start)
-    arguments = (problem.study, window, first.composed)
+    arguments = (problem.study, window)
     with workers(make_evaluator, arguments, options.jobs, options.cluster) as pool:
         found = run_search(
             method, pool.map, window.local(start), population, seed, allowed, restored=kept_population(state),
@@ -86,7 +86,7 @@ def _descended(problem: Problem, first: Tuned, start: Array, seed: int, allowed:
         lambda spent, cost: progress.update(spent / allowed.evaluations, f"best {cost:.4g}"),
     )  # fmt: skip
     point = tried[0] if tried else start
-    (outcome,) = evaluate(loop, [problem.at(point)], composed=first.composed)
+    (outcome,) = evaluate(loop, [problem.at(point)])
     spent = replace(first, gains=problem.at(point), evaluations=used + 1, runs=outcome.runs)
     if not outcome.feasible:
         return _proved(problem, spent)
@@ -100,11 +100,11 @@ def _shortened(problem: Problem, spent: Tuned, best: Best) -> Tuned:
         {member.name: member.shortened(gains[member.name], digits) for member in problem.members}
         for digits in SHORT_DIGITS
     ]
-    short = shortest(choices, lambda some: evaluate(loop, some, composed=spent.composed), best.outcome)
+    short = shortest(choices, lambda some: evaluate(loop, some), best.outcome)
     kept: GainSet = gains if short is None else short[0]
     return _proved(problem, replace(spent, gains=kept, evaluations=spent.evaluations + len(choices)))
 
 
 def _proved(problem: Problem, tuned: Tuned) -> Tuned:
-    contracts = contracts_of(problem, tuned.gains, composed=tuned.composed)
+    contracts = contracts_of(problem, tuned.gains)
     return replace(tuned, contracts=contracts)

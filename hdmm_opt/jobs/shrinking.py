@@ -30,7 +30,7 @@ def provable_share(problem: Problem, gains: GainSet, kinds: Iterable[str] = tupl
 
     def good(share: float) -> bool:
         smaller = shrunk(problem, share, kinds)
-        contracts = contracts_of(smaller, gains, composed=len(kinds) == len(KINDS))
+        contracts = contracts_of(smaller, gains)
         return violation(smaller, contracts, gains) == 0.0
 
     if not good(0.0):

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stability import Failure, error_rows
-from stability.certificates.composition import Composition
 
 from ..problem import GainSet, Member, Problem
 from ..problem.margins import UNPROVED, certified_error, violation
@@ -25,6 +24,8 @@ from .options import Progress
 
 #: Bandwidths of the outermost row, rad/s, and ratios of successive ones, from which the search begins.
 OUTER, RATIOS = (5.0, 10.0, 18.0), (8.0, 14.0)
+#: Shares of the gains of load networks, of ω β.
+NETWORK = (0.1, 0.3)
 #: Step factors of the pattern search that improves the best of them.
 STEPS = (1.5, 1.2)
 #: An effect of a control below this is none.
@@ -40,28 +41,27 @@ class Tuned:
         contracts: Their proofs, or why there are none.
         evaluations: Candidates that were looked at.
         runs: Closed-loop runs that were spent.
-        composed: Whether a composition is among the proofs: candidates are then judged by compositions too.
     """
 
     gains: GainSet
     contracts: Contracts | Failure
     evaluations: int
     runs: int = 0
-    composed: bool = False
 
 
-def cascade(problem: Problem, outer: float, ratios: Sequence[float]) -> GainSet:
+def cascade(problem: Problem, outer: float, ratios: Sequence[float], network: float | None = None) -> GainSet:
     """Gains with bandwidths ω_1 and ω_{i+1} = ratio_i ω_i in every member, inside the ranges of the study.
 
     Args:
         problem: The problem.
         outer: ω_1, rad/s.
         ratios: Ratios of the bandwidths of successive rows; the last one is repeated.
+        network: Share of the gains of load networks; see `with_bandwidths`.
     """
-    return {member.name: _rungs(member, outer, ratios) for member in problem.members}
+    return {member.name: _rungs(member, outer, ratios, network) for member in problem.members}
 
 
-def _rungs(member: Member, outer: float, ratios: Sequence[float]) -> Values:
+def _rungs(member: Member, outer: float, ratios: Sequence[float], network: float | None) -> Values:
     searched = member.searched
     quiet = member.values(np.array([1.0 if member.ranges[i].name.startswith("sigma") else 0.0 for i in searched]))
     widths: list[float] = []
@@ -70,7 +70,7 @@ def _rungs(member: Member, outer: float, ratios: Sequence[float]) -> Values:
         follows = isinstance(member.plant.targets[i], int)
         ratio = ratios[min(len(widths), len(ratios)) - 1] if widths and follows and ratios else 1.0
         widths.append(widths[-1] * ratio if widths else outer)
-    return with_bandwidths(member, quiet, widths)
+    return with_bandwidths(member, quiet, widths, network)
 
 
 def bandwidths(member: Member, values: Values) -> list[float]:
@@ -78,13 +78,24 @@ def bandwidths(member: Member, values: Values) -> list[float]:
     return [per * g.beta for per, g in zip(_per_gain(member, values), member.gains(values), strict=True)]
 
 
-def with_bandwidths(member: Member, values: Values, widths: Sequence[float]) -> Values:
-    """The gains with other β, inside their ranges and in four digits."""
-    made = list(values)
-    for k, (per, width) in enumerate(zip(_per_gain(member, values), widths, strict=True)):
-        index = next(i for i, item in enumerate(member.ranges) if item.name == f"beta_{k + 1}")
-        item = member.ranges[index]
-        made[index] = min(max(float(f"{width / per:.4g}"), item.low), item.high)
+def with_bandwidths(member: Member, values: Values, widths: Sequence[float], network: float | None = None) -> Values:
+    """The gains with other β, inside their ranges and in four digits.
+
+    Args:
+        member: The member.
+        values: Its gains.
+        widths: Bandwidths of its controlled rows, rad/s.
+        network: Where it is given, every γ that is searched is this share of ω β: a quarter, and the row with its load
+            network has a double pole.
+    """
+    made, place = list(values), {item.name: i for i, item in enumerate(member.ranges)}
+    for k, (per, width) in enumerate(zip(_per_gain(member, values), widths, strict=True), 1):
+        wanted = {f"beta_{k}": width / per}
+        if network is not None and not member.ranges[place[f"gamma_{k}"]].fixed:
+            wanted[f"gamma_{k}"] = network * width**2 / per
+        for name, value in wanted.items():
+            item = member.ranges[place[name]]
+            made[place[name]] = min(max(float(f"{value:.4g}"), item.low), item.high)
     return tuple(made)
 
 
@@ -100,45 +111,41 @@ def starting_point(problem: Problem, progress: Progress) -> Tuned:
     """The cascade with the smallest certified bound on the output, or the least bad that was met."""
     if not problem.searched:
         gains = problem.at(np.zeros(0))
-        contracts = contracts_of(problem, gains, composed=True)
-        return Tuned(gains=gains, contracts=contracts, evaluations=1, composed=_composed(contracts))
-    found = _Cascades(problem, progress, composed=False).best()
-    if not isinstance(found.contracts, Failure) or problem.linked:
-        return found
-    return _Cascades(problem, progress, composed=True).best()
-
-
-def _composed(contracts: Contracts | Failure) -> bool:
-    if isinstance(contracts, Failure):
-        return False
-    return any(isinstance(contract.certificate, Composition) for contract in contracts.values())
+        return Tuned(gains=gains, contracts=contracts_of(problem, gains), evaluations=1)
+    return _Cascades(problem, progress).best()
 
 
 class _Cascades:
     """A grid, then a pattern search; every cascade is looked at once."""
 
-    def __init__(self, problem: Problem, progress: Progress, *, composed: bool) -> None:
-        self.problem, self.progress, self.composed = problem, progress, composed
+    def __init__(self, problem: Problem, progress: Progress) -> None:
+        self.problem, self.progress = problem, progress
         stages = max(len(member.law.controlled) for member in problem.members)
         self.count = min(stages, 3)  # ω_1 and up to two ratios
+        searched = [m.ranges[i].name for m in problem.members for i in m.searched]
+        self.shares = NETWORK if any(name.startswith("gamma") for name in searched) else ()
         self.seen: dict[tuple[float, ...], tuple[tuple[float, float], Tuned]] = {}
 
     def at(self, point: tuple[float, ...]) -> tuple[float, float]:
         """Violation and certified bound of a cascade."""
         key = _short(point)
         if key not in self.seen:
-            gains = cascade(self.problem, key[0], key[1:])
-            contracts = contracts_of(self.problem, gains, composed=self.composed)
+            ratios, network = key[1 : self.count], key[self.count] if self.shares else None
+            gains = cascade(self.problem, key[0], ratios, network)
+            contracts = contracts_of(self.problem, gains)
             lacking = violation(self.problem, contracts, gains)
             bound = math.inf if isinstance(contracts, Failure) else certified_error(self.problem, contracts)
-            tuned = Tuned(gains=gains, contracts=contracts, evaluations=0, composed=_composed(contracts))
+            tuned = Tuned(gains=gains, contracts=contracts, evaluations=0)
             self.seen[key] = ((lacking, bound), tuned)
             self.progress.update(0.0, f"{len(self.seen)} cascades")
         return self.seen[key][0]
 
     def best(self) -> Tuned:
         """The best that was met."""
-        grid = [(outer, *[ratio] * (self.count - 1)) for outer in OUTER for ratio in RATIOS]
+        grid = [
+            (outer, *[ratio] * (self.count - 1), *share)
+            for outer in OUTER for ratio in RATIOS for share in ([(s,) for s in self.shares] or [()])
+        ]  # fmt: skip
         best = min(grid, key=self.at)
         if self.at(best)[0] < UNPROVED:
             for step in STEPS:
@@ -146,7 +153,7 @@ class _Cascades:
                 while better:
                     around = [
                         (*best[:k], best[k] * factor, *best[k + 1 :])
-                        for k in range(self.count) for factor in (step, 1 / step)
+                        for k in range(len(best)) for factor in (step, 1 / step)
                     ]  # fmt: skip
                     found = min(around, key=self.at)
                     better = self.at(found) < self.at(best)

@@ -76,7 +76,7 @@ def tradeoff(
     progress.stage("Pareto search")
     begin = problem.point(first.gains)
     window = Window.around(problem, begin)
-    with workers(make_evaluator, (study, window, first.composed), options.jobs, options.cluster) as pool:
+    with workers(make_evaluator, (study, window), options.jobs, options.cluster) as pool:
         now = kept_population(state) or start(pool.map, window.local(begin), population, seed)
         while now.iteration < iterations:
             now = pareto_jaya(pool.map, now)

@@ -14,7 +14,7 @@ from ..files.result import Validation
 from ..problem import GainSet, Problem
 from ..problem.margins import output_bound
 from ..problem.problem import Contracts
-from ..simulation import Figures, Loop, Run, Scenario, scenarios, within_assumptions
+from ..simulation import Figures, Loop, Run, Scenario, rated, scenarios, within_assumptions
 from ..simulation.requirements import missed, missed_in
 from .worst_case import uncertain, worst_corner
 
@@ -103,16 +103,11 @@ def draws(problem: Problem, count: int, seed: int) -> list[Scenario]:
             courses[disturbance.name] = tuple(points)
         corner = problem.linked and k % 2
         shares = random.choice((-1.0, 1.0), len(names)) if corner else random.uniform(-1, 1, len(names))
-        made.append(
-            Scenario(
-                name=f"draw-{k + 1}",
-                disturbances=courses,
-                parameters=dict(zip(names, map(float, shares), strict=True)),
-                noise=1.0,
-                initial=float(random.uniform(-1, 1)),
-                seed=seed + k,
-            )
-        )
+        drawn = Scenario(
+            name=f"draw-{k + 1}", disturbances=courses, parameters=dict(zip(names, map(float, shares), strict=True)),
+            noise=1.0, initial=float(random.uniform(-1, 1)), seed=seed + k,
+        )  # fmt: skip
+        made.append(rated(problem, drawn))
     return made
 
 

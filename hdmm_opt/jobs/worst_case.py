@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import product
 
 from ..problem import Problem
-from ..simulation import Figures, Scenario
+from ..simulation import Figures, Scenario, rated
 from ..simulation.scenario import Course
 
 Simulate = Callable[[Sequence[Scenario]], list[Figures]]
@@ -58,7 +58,9 @@ def worst_corner(problem: Problem, simulate: Simulate) -> tuple[Scenario, Figure
     Not guaranteed: that it is the worst; it is a lower bound on the worst case.
     """
     names = uncertain(problem)
-    made = [Scenario(name=f"worst-{key}", disturbances=courses) for key, courses in shapes(problem).items()]
+    made = [
+        rated(problem, Scenario(name=f"worst-{key}", disturbances=courses)) for key, courses in shapes(problem).items()
+    ]
     tried = list(zip(made, simulate(made), strict=True))
     base = max(tried, key=_late)[0]
     ends = [replace(base, parameters={name: sign}) for name in names for sign in (1.0, -1.0)]

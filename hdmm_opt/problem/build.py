@@ -21,7 +21,7 @@ from ..motions.slices import sliced
 from ..names import nearest
 from ..plants import Parameter, Plant
 from ..study import Study
-from .gains import gain_ranges
+from .gains import gain_ranges, preloaded
 from .member import Member
 from .problem import Problem
 
@@ -75,10 +75,12 @@ def assemble(study: Study, references: tuple[Reference, ...] | None = None) -> P
             study, plant, references[k], 1 / study.controller.rate_of(name), spans, noise[name], initial[name],
             None if foreseen is None else foreseen[k],
         )  # fmt: skip
+        named, loop = given[name][0], law.loop_model()
+        chosen = preloaded(law, loop, bounds, ranges[name], operating_box(plant), named)
         accuracy = study.requirements.member_error.get(name, study.requirements.tracking_error_m)
         members.append(Member(
-            name=name, plant=plant, law=law, model=law.loop_model(), reference=references[k], bounds=bounds,
-            box=operating_box(plant), ranges=ranges[name], accuracy=accuracy,
+            name=name, plant=plant, law=law, model=loop, reference=references[k], bounds=bounds,
+            box=operating_box(plant), ranges=chosen, accuracy=accuracy,
         ))  # fmt: skip
     return Problem(
         study=study, machine=machine, members=tuple(members), slices=slices, loads=loads, observers=observers
@@ -106,6 +108,10 @@ def _check_disturbances(study: Study, machine: Machine) -> Iterator[InvalidInput
         if machine.forces is None and low == high:
             yield InvalidInputError(
                 f"uncertainty.disturbances.{name} is an empty range: got [{low:g}, {high:g}]; widen it"
+            )
+        if machine.forces is not None and given[name].rate is not None:
+            yield InvalidInputError(
+                f"uncertainty.disturbances.{name}.rate has no meaning here: {name} is constant in a run; remove it"
             )
         if disturbance.course == "constant" and (low < 0 or given[name].course == "any"):
             yield InvalidInputError(
@@ -237,16 +243,19 @@ def _bounds(
     noise: tuple[float, ...], initial: tuple[float, ...], foreseen: tuple[Interval, Interval] | None,
 ) -> Bounds:  # fmt: skip
     """The assumptions of a member: its own disturbances, or the load of a coupling at the reference."""
-    nominal = dict(plant.values())
-    feedforward, known = {}, foreseen is not None and "mechanics" in study.controller.modelling
+    nominal, feedforward = dict(plant.values()), {}
     if foreseen is None:
         disturbances = {name: spans[name] for name in plant.disturbances}
         nominal |= {name: (value.low + value.high) / 2 for name, value in disturbances.items()}
+        for name in plant.disturbances:
+            rate = study.uncertainty.disturbances[name].rate
+            if rate is not None:
+                feedforward[name] = disturbances[name], Interval.symmetric(rate)
+                disturbances[name] = Interval(0.0)
     else:
         (load,) = plant.disturbances
-        disturbances = {load: Interval(0.0) if known else foreseen[0]}
-        feedforward = {load: foreseen} if known else {}
-        nominal |= {} if known else {load: 0.0}
+        disturbances, feedforward[load] = {load: Interval(0.0)}, foreseen
+        nominal |= {} if "mechanics" in study.controller.modelling else {load: 0.0}
     return Bounds(
         parameters={name: parameter_range(p) for name, p in plant.parameters.items()},
         disturbances=disturbances,
@@ -257,6 +266,8 @@ def _bounds(
         period=period,
         transient=study.validation.transient_s,
         feedforward=feedforward,
+        delay=study.controller.delay_s,
+        rest=(float(reference(np.zeros(1))[0, 0]), study.reference.dwell_s),
     )
 
 

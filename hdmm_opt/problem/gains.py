@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
-from ..control import GainSpec
+import numpy as np
+from numpy.typing import NDArray
+
+from stability import Bounds, LoopModel, first_box
+
+from ..control import GainSpec, ProvableLaw
 from ..errors import InvalidInputError
 from ..names import nearest
 from ..study.sections import GainSection
 from .member import GainRange
+
+#: Significant digits of a preload, and what counts for none beside the range of the demand.
+DIGITS, NOTHING = 3, 1e-3
 
 
 def gain_ranges(
@@ -34,7 +43,7 @@ def gain_ranges(
     found = []
     for spec in schema:
         low, high = _ends(spec, given.get(spec.name), where, derived)
-        if not (low > 0 or (spec.zero and low == 0)):
+        if not (low > 0 or (spec.zero and low == 0) or spec.signed):
             raise InvalidInputError(f"{where}.{spec.name} must be positive: got {low:g}; correct the value")
         found.append(GainRange(name=spec.name, low=low, high=high, unit=spec.unit, meaning=spec.meaning))
     return tuple(found)
@@ -52,3 +61,41 @@ def _ends(
     if entry.value is not None:
         return entry.value, entry.value
     return float(entry.min or 0.0), float(entry.max or 0.0)
+
+
+def preloaded(
+    law: ProvableLaw, model: LoopModel, bounds: Bounds, ranges: Sequence[GainRange], box: NDArray[np.float64],
+    given: Collection[str],
+) -> tuple[GainRange, ...]:  # fmt: skip
+    """The ranges, with load networks that a study gives no preload starting at the middle of what they have to meet.
+
+    Args:
+        law: The law.
+        model: Plant and law as data.
+        bounds: Assumptions.
+        ranges: The gains.
+        box: Largest box of errors. Shape (n,).
+        given: Names of the gains that the study gives.
+
+    Raises:
+        InvalidInputError: a network without a bound on its estimate.
+    """
+    named = {item.name: item for item in ranges}
+    gains = law.rows_of([item.high for item in ranges])
+    found = [k for k, g in enumerate(gains, 1) if g.gamma > 0]
+    for k in found:
+        if not named[f"phi_{k}"].low > 0:
+            raise InvalidInputError(
+                f"controller: phi_{k}, the largest estimate of a load network, must be positive where gamma_{k} is: "
+                f"give its value in {named[f'phi_{k}'].unit}"
+            )
+    if not found:
+        return tuple(ranges)
+    start = first_box(model, bounds, gains, 1e-9 * box)
+    for k, low, high in zip(found, start.low, start.high, strict=True):
+        name = f"preload_{k}"
+        if name not in given:
+            middle = (low + high) / 2
+            middle = float(f"{middle:.{DIGITS}g}") if abs(middle) > NOTHING * (high - low) else 0.0
+            named[name] = replace(named[name], low=middle, high=middle)
+    return tuple(named.values())

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from stability import Failure, tangents_many
+from stability import Failure, Impulse, tangents_many
 from stability.certificates.certificate import Certificate
 from stability.networks.contracts import Contract
 
@@ -20,7 +20,7 @@ from .problem import Contracts, GainSet, Problem
 Array = NDArray[np.float64]
 
 #: Limits and requirements must hold with this relative room, so that the exact check, which rounds outwards, agrees.
-HEADROOM = 2e-4
+HEADROOM = 1e-3
 #: Violations of gains that are proved member by member but not together, and of gains that are not.
 APART, UNPROVED = 10.0, 100.0
 
@@ -32,7 +32,8 @@ class Margin:
     Attributes:
         member: Whose it is; empty for the output of the machine.
         name: What it is, for messages.
-        kind: "limit" of a signal, "travel" inside the stroke, or "error" against a requirement.
+        kind: "limit" of a signal, "travel" inside the stroke, "network" for the estimate of a load network, or "error"
+            against a requirement.
         certified: Bound over the certified set, [unit].
         limit: What it must not pass, [unit].
         unit: SI unit.
@@ -40,7 +41,7 @@ class Margin:
 
     member: str
     name: str
-    kind: Literal["limit", "travel", "error"]
+    kind: Literal["limit", "travel", "network", "error"]
     certified: float
     limit: float
     unit: str
@@ -77,6 +78,13 @@ def member_margins(member: Member, found: Certificate, *, shown: bool) -> list[M
     size = max(span.high + radius - middle, middle - span.low + radius)
     half = (plant.stroke[1] - plant.stroke[0]) / 2
     made.append(Margin(member=name, name="stroke", kind="travel", certified=size, limit=half, unit=unit))
+    if isinstance(found, Impulse):
+        units = dict(zip(plant.states, member.control_units, strict=True))
+        for state, size, capacity in zip(found.networks, found.estimates, found.capacity, strict=True):
+            made.append(Margin(
+                member=name, name=f"phi of {state}", kind="network", certified=float(size), limit=float(capacity),
+                unit=units[state],
+            ))  # fmt: skip
     error = float(found.ultimate[0])
     made.append(
         Margin(member=name, name="tracking error", kind="error", certified=error, limit=member.accuracy, unit=unit)

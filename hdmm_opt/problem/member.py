@@ -73,6 +73,14 @@ class Member:
     accuracy: float
 
     @property
+    def control_units(self) -> list[str]:
+        """The unit of each row's virtual control, or of the input."""
+        plant = self.plant
+        following = [[u for t, u in zip(plant.targets, plant.state_units, strict=True) if t == i]
+                     for i in range(len(plant.states))]  # fmt: skip
+        return [units[0] if units else plant.input_unit for units in following]
+
+    @property
     def searched(self) -> list[int]:
         """Indices of the gains that are not fixed."""
         return [i for i, gain in enumerate(self.ranges) if not gain.fixed]

@@ -80,6 +80,10 @@ class Problem:
         """The assumed range of one of the machine's disturbances."""
         return Interval(*self.study.uncertainty.disturbances[name].range)
 
+    def rate_of(self, name: str) -> float | None:
+        """The assumed bound on the rate of one of the machine's disturbances; None where it may change at any rate."""
+        return self.study.uncertainty.disturbances[name].rate
+
     def at(self, point: Array, *, digits: int = 4) -> GainSet:
         """The gains at a point of the unit cube of all that is searched."""
         found, first = {}, 0
@@ -104,8 +108,7 @@ class Problem:
             sizes, _ = self.loads.deviation(self.slices, [guarantees[member.name] for member in self.members])
             for member, size in zip(self.members, sizes, strict=True):
                 (load,) = member.plant.disturbances
-                middle = Interval(0.0) if self.foreseeing else member.bounds.disturbances[load]
-                spread = {load: middle + Interval.symmetric(SPARE * size)}
+                spread = {load: Interval.symmetric(SPARE * size)}
                 found[member.name] = replace(member.bounds, disturbances=spread)
         for member in self.members:
             if member.name in self.observers:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..control.law import step_function
 from ..problem import GainSet, Problem
 from .engine.engine import Batch
 from .layout import Part, size_of
@@ -38,6 +39,7 @@ class Batches:
         self.problem, self.parts, self.period = problem, parts, period
         self._shared: Array | None = None
         self._goals: dict[int, Any] = {}
+        self._steps: dict[int, Any] = {}
 
     def shared(self) -> Array:
         """References of all members, then the foreseen loads, at the ticks. Shape (ticks, 4 n or 5 n)."""
@@ -127,12 +129,26 @@ class Batches:
             x[part.x] = own
             discrete = part.discrete(z)
             discrete["law"][:] = np.reshape(
-                np.array([part.law.start(column.tolist()) for column in own.T]).T, (part.law.states, lanes)
+                np.array(
+                    [part.law.start(*map(np.ndarray.tolist, pair)) for pair in zip(own.T, gains.T, strict=True)]
+                ).T,
+                (part.law.states, lanes),
             )
+            if part.waiting:
+                commands = self._first_commands(k, own, reference, discrete["law"], gains, load)
+                discrete["pending"][:] = np.tile(commands, (part.waiting, 1))
             if part.observed:
                 # an observer starts from its first measurement and the reference's speed
                 discrete["observer"][0], discrete["observer"][1] = own[0], r[1]
         return x, z
+
+    def _first_commands(self, k: int, x: Array, r: Array, z: Array, gains: Array, load: Sequence[float]) -> Array:
+        """The first input of each run without measurement errors: it acts until the first one has passed its delay."""
+        part, nominal = self.parts[k], list(self.parts[k].law.plant.values().values())
+        if k not in self._steps:
+            self._steps[k] = step_function(part.law, part.period)
+        step, lanes = self._steps[k], x.shape[1]
+        return np.array(step.map(lanes)(x, r, z, gains, *(np.tile(v, (lanes, 1)).T for v in (nominal, list(load))))[0])
 
     def _targets(self, k: int, x: Array, r: Array, gains: Array, load: Sequence[float]) -> Array:
         """What each state of a member tracks; nothing but the reference where its law is a rival. Shape (n, lanes)."""
@@ -145,14 +161,15 @@ class Batches:
 
 
 def _targets_of(law: Any) -> Any:
-    """CasADi function (x, r, gains, load) -> target of each row, adaptive scalars at zero."""
+    """CasADi function (x, r, gains, load) -> target of each row; adaptive scalars at zero, networks at the preload."""
     import casadi as ca
 
     plant = law.plant
     x, r = ca.SX.sym("x", len(plant.states)), ca.SX.sym("r", 4)
     gains, load = ca.SX.sym("gains", len(law.schema)), ca.SX.sym("load", plant.w.numel())
     nominal = ca.DM(list(plant.values().values()))
-    virtual, _ = law.virtual_controls(x, r, ca.SX.zeros(law.states), gains, nominal, load)
+    start = ca.vertcat(*law.start([0.0] * len(plant.states), ca.vertsplit(gains)))
+    virtual, _ = law.virtual_controls(x, r, start, gains, nominal, load)
     goals = [r[0] if t == "reference" else 0 if t == "zero" else virtual[int(t)] for t in plant.targets]
     return ca.Function("targets", [x, r, gains, load], [ca.vertcat(*goals)])
 

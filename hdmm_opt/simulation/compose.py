@@ -128,7 +128,35 @@ def _tasks(
             measured = _measured(part, states[i], channel, constants[i], extras)
             after.append(_controlled(problem, part, measured, r[i], foreseen[i], discrete[i], constants[i], t, extras))
         found.append(Task(every=every, after=ca.vertcat(*after)))
+    if any(part.waiting for part in parts):
+        passed = [_passed(part, discrete[i], constants[i], t, extras) for i, part in enumerate(parts)]
+        found.append(Task(every=1, after=ca.vertcat(*passed)))
     return tuple(found)
+
+
+def _passed(part: Part, discrete: dict[str, Any], constants: dict[str, Any], t: Any, extras: frozenset[str]) -> Any:
+    """Inputs on their way to the actuator, moved on by a tick."""
+    import casadi as ca
+
+    if not part.waiting:
+        return ca.vertcat(*discrete.values())
+    size, queue = len(part.law.plant.inputs), ca.vertcat(discrete["commanded"], discrete["pending"])
+    moved = {
+        "applied": _delivered(queue[size * part.waiting :], constants, t, extras),
+        "pending": queue[: size * part.waiting],
+    }
+    return ca.vertcat(*(discrete | moved).values())
+
+
+def _delivered(u: Any, constants: dict[str, Any], t: Any, extras: frozenset[str]) -> Any:
+    """What a faulty actuator makes of its input."""
+    import casadi as ca
+
+    if "fault" not in extras:
+        return u
+    fault = constants["fault"]
+    a = ca.if_else(t >= fault[1], fault[0] * (1 - ca.exp(-fault[2] * (t - fault[1]))), 0)
+    return (1 - a) * u + a * fault[3:]
 
 
 def _measured(part: Part, x: Any, draws: Any, constants: dict[str, Any], extras: frozenset[str]) -> Any:
@@ -168,8 +196,5 @@ def _controlled(
     u, after, errors = part.law.step(
         seen, r, discrete["law"], constants["gains"], nominal, load, part.period
     )  # fmt: skip
-    applied, fault = u, constants["fault"]
-    if "fault" in extras:
-        a = ca.if_else(t >= fault[1], fault[0] * (1 - ca.exp(-fault[2] * (t - fault[1]))), 0)
-        applied = (1 - a) * u + a * fault[3:]
-    return ca.vertcat(after, u, applied, errors, following)
+    applied = discrete["applied"] if part.waiting else _delivered(u, constants, t, extras)
+    return ca.vertcat(after, u, applied, errors, following, discrete["pending"])

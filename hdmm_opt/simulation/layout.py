@@ -1,6 +1,7 @@
 """Where everything of a loop lies: symbols and slices of its states and constants, member by member.
 
-Discrete states, member by member: those of the law, commanded input, applied input, errors, and those of the observer.
+Discrete states, member by member: those of the law, commanded input, applied input, errors, those of the observer, and
+the inputs that wait for their delay, newest first.
 Constants of a run: by member gains, parameters, spread and offset of the noisy states, quantisation steps, and the
 fault's share, start, rate and stuck input. Shared columns: each reference with three derivatives, then foreseen loads.
 """
@@ -29,6 +30,7 @@ class Part:
         noise: Bounds on its measurement errors. Shape (n,).
         observed: Whether an observer estimates its position and speed.
         errors: Number of errors that its law shows.
+        waiting: Ticks until a commanded input acts.
         x, z, draws, fixed: Slices of its states, discrete states, random draws and constants.
     """
 
@@ -40,6 +42,7 @@ class Part:
     noise: tuple[float, ...]
     observed: bool
     errors: int
+    waiting: int
     x: slice
     z: slice
     draws: slice
@@ -59,7 +62,7 @@ class Part:
         return found
 
     def discrete(self, z: Any) -> dict[str, Any]:
-        """Its discrete states by name: law, commanded, applied, errors, observer."""
+        """Its discrete states by name: law, commanded, applied, errors, observer, pending."""
         return self.cut(z[self.z], self.discrete_sizes)
 
     def constants(self, fixed: Any) -> dict[str, Any]:
@@ -71,7 +74,7 @@ class Part:
         """Sizes of its discrete states."""
         inputs = len(self.law.plant.inputs)
         return {"law": self.law.states, "commanded": inputs, "applied": inputs, "errors": self.errors,
-                "observer": STATES if self.observed else 0}  # fmt: skip
+                "observer": STATES if self.observed else 0, "pending": inputs * self.waiting}  # fmt: skip
 
     @property
     def constant_sizes(self) -> dict[str, int]:
@@ -101,7 +104,8 @@ def parts_of(problem: Problem, laws: Sequence[Law], period: float) -> list[Part]
         nothing = slice(0, 0)
         part = Part(
             index=k, name=member.name, law=law, every=every, period=every * period, noise=noise, observed=observed,
-            errors=errors_of(law), x=nothing, z=nothing, draws=nothing, fixed=nothing,
+            errors=errors_of(law), waiting=round(member.bounds.delay / period), x=nothing, z=nothing, draws=nothing,
+            fixed=nothing,
         )  # fmt: skip
         sizes = {"x": len(law.plant.states), "z": sum(part.discrete_sizes.values()), "draws": len(part.noisy),
                  "fixed": sum(part.constant_sizes.values())}  # fmt: skip

@@ -25,7 +25,7 @@ from .layout import parts_of
 from .records import Settings
 from .scenario import Scenario
 from .sensitivity import differentiated
-from .steps import steps_of
+from .steps import steps_of, tick_of
 from .trace import MemberTrace, Trace
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Loop:
             members = tuple(m.under(replace(m.bounds, period=period)) for m in problem.members)
             problem = replace(problem, members=members)
         self.problem, self.refinement, self.compiled = problem, refinement, compiled
-        self.period = problem.period
+        self.period = tick_of(problem)
         self.parts = parts_of(problem, laws or [member.law for member in problem.members], self.period)
         study = problem.study
         self.settings = Settings(transient=study.validation.transient_s, band=study.requirements.band)

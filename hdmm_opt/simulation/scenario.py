@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -111,7 +113,14 @@ def scenarios(problem: Problem) -> list[Scenario]:
 
 
 def within_assumptions(problem: Problem, scenario: Scenario) -> bool:
-    """Whether the assumptions of the proof hold a scenario: faults may only take effectiveness that is allowed for."""
+    """Whether the assumptions of the proof hold a scenario.
+
+    Faults may only take effectiveness that is allowed for, and disturbances change no faster than the study says.
+    """
+    for name, course in scenario.disturbances.items():
+        rate = problem.rate_of(name)
+        if rate is not None and _steepest(course) > rate * (1 + 1e-9):
+            return False
     return all(_allowed(problem.member(name).plant, name, fault, scenario) for name, fault in scenario.faults.items())
 
 
@@ -122,6 +131,40 @@ def _allowed(plant: Plant, name: str, fault: Fault, scenario: Scenario) -> bool:
     low, high = p.ends or (p.value, p.value)
     at = scenario.parameter(name, EFFECTIVENESS, p)
     return low - 1e-12 <= at * (1 - fault.share) and at <= high + 1e-12
+
+
+def rated(problem: Problem, scenario: Scenario) -> Scenario:
+    """The scenario with disturbances that change no faster than the study says."""
+    made = {}
+    for name, course in scenario.disturbances.items():
+        rate = problem.rate_of(name)
+        made[name] = course if rate is None else slowed(course, rate)
+    return replace(scenario, disturbances=made)
+
+
+def slowed(course: Course, rate: float) -> Course:
+    """The course that follows another one as fast as a rate allows."""
+    made, behind = [course[0]], False
+    for time, value in course[1:]:
+        begin, now = made[-1]
+        need = abs(value - now) / rate
+        if begin + need > time:
+            made.append((time, now + math.copysign(rate * (time - begin), value - now)))
+            behind = True
+            continue
+        if behind and need > 0:
+            made.append((begin + need, value))
+        if time > made[-1][0]:
+            made.append((time, value))
+        behind = False
+    if behind:
+        made.append((made[-1][0] + abs(course[-1][1] - made[-1][1]) / rate, course[-1][1]))
+    return tuple(made)
+
+
+def _steepest(course: Course) -> float:
+    slopes = (abs(w - v) / (t - s) if t > s else math.inf for (s, v), (t, w) in pairwise(course) if w != v)
+    return max(slopes, default=0.0)
 
 
 def course_at(course: Course, t: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Integration steps in a tick, from the time constants of the plants."""
+"""The tick of a loop, and integration steps in it from the time constants of the plants."""
 
 from __future__ import annotations
 
@@ -8,11 +8,24 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..plants import Plant
+from ..problem import Problem
 
 #: Longest integration step as a share of the fastest time constant.
 STEP_SHARE = 0.35
 #: Longest integration step, s: between the control instants a loop is looked at this often.
 LONGEST = 5e-4
+#: Parts that a control period is cut into at most, so that inputs switch at ticks.
+PARTS = 20
+
+
+def tick_of(problem: Problem) -> float:
+    """The shortest control period, or the part of it that divides the computing delay; or a twentieth, nearly so."""
+    period, delay = problem.period, max(member.bounds.delay for member in problem.members)
+    for parts in range(1, PARTS + 1):
+        ticks = delay / period * parts
+        if abs(ticks - round(ticks)) < 1e-6:
+            return period / parts
+    return period / PARTS
 
 
 def steps_of(plant: Plant, period: float, disturbances: Sequence[float]) -> int:

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from ..errors import RefusedKeyError
 from ..machines.registry import model
 from .messages import refused, refused_together
-from .sections import LimitSection, Name, NonNegative, Pair, ParameterSection, Section
+from .sections import LimitSection, Name, NonNegative, Pair, ParameterSection, Positive, Section
 
 
 class NumberSection(Section):
@@ -57,9 +57,10 @@ class PlantSection(NumberSection):
 
 
 class DisturbanceSection(Section):
-    """The range of something from outside; constant in a run, or of any course."""
+    """The range of something from outside; constant in a run, or of any course, at any rate or at a bounded one."""
 
     range: Pair
+    rate: Positive | None = None
     course: Literal["constant", "any"] | None = None
     unit: str | None = None
 

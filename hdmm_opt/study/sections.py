@@ -55,7 +55,7 @@ class LimitSection(Section):
 class GainSection(Section):
     """A gain: fixed by `value`, or searched between `min` and `max`."""
 
-    value: NonNegative | None = None
+    value: float | None = None
     min: Positive | None = None
     max: Positive | None = None
 

@@ -19,8 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..loops.deviation import DeviationRows
-from ..loops.period import comparison
 from ..loops.rows import ErrorRows
 from .definite import positive_definite
 
@@ -84,14 +82,6 @@ def from_error_rows(rows: ErrorRows, scale: Array) -> Inclusion:
     low = np.minimum(rows.low / rows.mass_low[:, None], rows.low / rows.mass_high[:, None])
     high = np.maximum(rows.high / rows.mass_low[:, None], rows.high / rows.mass_high[:, None])
     return _entries((low + high) / 2, (high - low) / 2, rows.disturbance / rows.mass_low, scale, sampled=False)
-
-
-def from_period(rows: DeviationRows, period: float, scale: Array) -> Inclusion:
-    """The exact zero-order-hold map; what the nominal map leaves out is an uncertainty of each entry."""
-    image = comparison(rows, period, np.eye(len(rows.disturbance)))
-    moving = np.array([a for a, _ in image.vertices]).max(axis=0)
-    push = np.array([b for _, b in image.vertices]).max(axis=0)
-    return _entries(image.nominal, np.maximum(moving - np.abs(image.nominal), 0.0), push, scale, sampled=True)
 
 
 def _entries(middle: Array, radius: Array, push: Array, scale: Array, *, sampled: bool) -> Inclusion:

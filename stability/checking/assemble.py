@@ -13,7 +13,7 @@ from pathlib import Path
 #: The parts in the order in which they stand; each uses those before it.
 ORDER = (
     "limits", "arithmetic", "forms", "fixed", "parsing", "shape", "grammar", "claim", "reference", "statement",
-    "structure", "course", "reading", "loop", "deviation", "matrices", "period", "obligation", "composition", "sampled",
+    "structure", "course", "reading", "loop", "matrices", "turn", "sums", "responses", "obligation", "impulse",
     "golden", "effects", "obligations", "member", "motion", "coupling", "observer", "command",
 )  # fmt: skip
 TARGET = Path(__file__).parent.parent / "checker.py"

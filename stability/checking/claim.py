@@ -7,28 +7,31 @@ from fractions import Fraction
 from typing import Any
 
 from .arithmetic import Interval
-from .limits import VECTORS, need
-from .parsing import numbers
+from .limits import MAX_GROUP, MAX_GROUPS, MAX_ORDER, need
+from .parsing import index, number, numbers
 
 
 @dataclass(frozen=True)
 class Gain:
-    """Gains of one controlled row, as intervals."""
+    """Gains of one controlled row, as intervals; what bounds and starts its load network, as numbers."""
 
     beta: Interval
     epsilon: Interval
     delta: Interval
     sigma: Interval
+    gamma: Interval
+    capacity: Fraction
+    preload: Fraction
 
 
 @dataclass(frozen=True)
 class Cell:
-    """W, R, P and s of a sampled certificate for a part of the inertias' ranges."""
+    """What a file says of the loop for a part of the inertias' ranges: coordinates, groups of periods, weight."""
 
-    transform: list[list[Fraction]]
-    reach: list[Fraction]
-    start: list[Fraction]
-    shape: list[Fraction]
+    columns: list[list[Fraction]]
+    blocks: list[int]
+    groups: list[int]
+    growth: Fraction
 
 
 @dataclass(frozen=True)
@@ -48,14 +51,17 @@ class Claim:
     noise: list[Fraction]
     initial: list[Fraction]
     period: Fraction
+    delay: Fraction
     gains: list[tuple[Fraction, ...]]
-    kind: str
-    decay: Fraction
-    vectors: dict[str, list[Fraction]]
+    force: list[list[Fraction]]
+    drive: list[list[Fraction]]
     split: list[int]
     cells: list[Cell]
     half_widths: list[Fraction]
     input_bound: list[Fraction]
+    demand: list[Interval]
+    middle: list[Fraction]
+    network_bound: list[Fraction]
     ultimate: list[Fraction]
     limits: list[dict[str, Any]]
     stroke: Interval
@@ -63,6 +69,7 @@ class Claim:
     transient: Fraction
     feedforward: dict[str, tuple[Interval, Interval]] = field(default_factory=dict)
     first: str = "position"
+    rest: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0))
 
     @property
     def controlled(self) -> list[int]:
@@ -70,25 +77,34 @@ class Claim:
         return [i for i, row in enumerate(self.rows) if row["controlled"]]
 
     @property
-    def weights(self) -> list[Fraction]:
-        """Weights w of a composition."""
-        return self.vectors["weights"]
+    def networks(self) -> list[int]:
+        """Indices of the rows with a load network."""
+        return [i for i, gain in zip(self.controlled, self.gains, strict=True) if gain[4] > 0]
 
     @property
-    def young(self) -> list[Fraction]:
-        """Young's ν of a composition."""
-        return self.vectors["young"]
+    def whole(self) -> int:
+        """Whole periods of the computing delay."""
+        return int(self.delay / self.period)
 
     @property
-    def leak(self) -> list[Fraction]:
-        """The p = ε θ* of a composition."""
-        return self.vectors["leak"]
+    def share(self) -> Fraction:
+        """The rest of the delay as a share of the period."""
+        return self.delay / self.period - self.whole
+
+    @property
+    def pending(self) -> int:
+        """Samples whose inputs are still to act."""
+        return self.whole + (self.share > 0)
 
 
-def cell_of(entry: dict[str, Any], count: int) -> Cell:
-    """One cell of a sampled certificate."""
-    rows = entry["transform"]
-    need(isinstance(rows, list) and len(rows) == count, f"a transform must have {count} rows")
-    vectors = [numbers(entry[name], count, name) for name in VECTORS["sampled"]]
-    transform = [numbers(row, count, "a transform") for row in rows]
-    return Cell(transform, *vectors)
+def cell_of(entry: dict[str, Any]) -> Cell:
+    """One cell of a certificate; how large it must be is decided where the loop is built."""
+    columns = entry["columns"]
+    need(isinstance(columns, list) and 1 <= len(columns) <= MAX_ORDER, f"coordinates are of 1 to {MAX_ORDER} states")
+    blocks = [index(v, 3, "a block") for v in entry["blocks"]]
+    need(min(blocks) >= 1 and sum(blocks) == len(columns), "the blocks do not cover the coordinates")
+    groups = [index(v, MAX_GROUP + 1, "a group of periods") for v in entry["groups"]]
+    need(1 <= len(groups) <= MAX_GROUPS and min(groups) >= 1, f"1 to {MAX_GROUPS} groups of periods are summed")
+    growth = number(entry["growth"], "growth")
+    need(growth >= 1, "the weight of a period is 1 or more")
+    return Cell([numbers(row, len(columns), "coordinates") for row in columns], blocks, groups, growth)

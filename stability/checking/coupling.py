@@ -64,8 +64,10 @@ class Coupling:
         self.foreseeing = "mechanics" in study["controller"]["modelling"]
         for member in members:
             claim = member.claim
-            need(bool(claim.feedforward) == self.foreseeing, "what the members foresee is not what the law models")
+            need(set(claim.feedforward) == set(claim.disturbances), "a member of a coupling has one load, with a rate")
             need(len(claim.disturbances) == 1, "a member of a coupling has one disturbance, its load")
+            known = not set(claim.feedforward) & set(claim.nominal)
+            need(known == self.foreseeing, "what the members foresee is not what the law models")
         self.load = [next(iter(member.claim.disturbances)) for member in members]
         self.guarantee = [guarantee_of(data, member.name) for member in members]
         self.stated = number(entry["envelope"]["output"], "the bound on the output")
@@ -182,12 +184,10 @@ class Coupling:
         """How much room the assumptions of a member leave to its load on a slice."""
         claim = self.members[i].claim
         assumed = claim.disturbances[self.load[i]]
-        known = claim.feedforward.get(self.load[i])
-        if known is not None:
-            foreseen = all(o[0] <= a[0] and a[1] <= o[1] for a, o in ((load, known[0]), (rate, known[1])))
-            foreseen = foreseen and known[1][0] <= 0 <= known[1][1]  # after its end the reference rests
-            load = ZERO if foreseen else symmetric(2 * magnitude(assumed))
-        inner = add(load, symmetric(size))
+        known = claim.feedforward[self.load[i]]
+        foreseen = all(o[0] <= a[0] and a[1] <= o[1] for a, o in ((load, known[0]), (rate, known[1])))
+        foreseen = foreseen and known[1][0] <= 0 <= known[1][1]  # after its end the reference rests
+        inner = add(ZERO if foreseen else symmetric(2 * magnitude(assumed)), symmetric(size))
         return min(inner[0] - assumed[0], assumed[1] - inner[1]) / max(magnitude(assumed), Fraction(1, 10**9))
 
     def _well_posed(self) -> Fraction:

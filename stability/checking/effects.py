@@ -30,9 +30,9 @@ def effects_of(claim: Claim, ranges: dict[str, Interval]) -> dict[str, Fraction]
         ranges: Range of every state and input over the certified set.
     """
     stated = {**claim.parameters, **claim.disturbances}
-    middle = {name: float((low + high) / 2) for name, (low, high) in stated.items()}
     for name, (value, _) in claim.feedforward.items():
-        middle[name] = float(value[0] + value[1]) / 2
+        stated[name] = value[0] + stated[name][0], value[1] + stated[name][1]
+    middle = {name: float((low + high) / 2) for name, (low, high) in stated.items()}
     points = [{name: _clipped(low, high, share) for name, (low, high) in ranges.items()} for share in SHARES]
     rates = [_rates(claim, {**middle, **point}) for point in points]
     size = [max(max(abs(r[i]) for r in rates), 1e-300) for i in range(len(claim.rows))]

@@ -87,13 +87,13 @@ def walk(
     """Run an operation list in any arithmetic; returns every entry."""
     table: list[Any] = []
     WORK.one(len(program["operations"]) // 64)
-    for operator, *arguments in program["operations"]:
-        if operator == "input":
+    for name, *arguments in program["operations"]:
+        if name == "input":
             table.append(read(arguments[0]))
-        elif operator == "const":
+        elif name == "const":
             table.append(const(Fraction(arguments[0])))
         else:
-            table.append(apply(operator, *(table[i] for i in arguments)))
+            table.append(apply(name, *(table[i] for i in arguments)))
     return table
 
 
@@ -120,7 +120,8 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
         if operator == "sub":
             return table.node(key, plus(a.form, times(b.form, neg(ONE))), add(a.range, neg(b.range)))
         if operator == "div":
-            return table.node(key, times(a.form, inverse(b.range)), mul(a.range, inverse(b.range)))
+            form, natural = times(a.form, inverse(b.range)), mul(a.range, inverse(b.range))
+            return (table.node if set(b.form) <= {""} else table.fresh)(key, form, natural)
         return multiply(key, a, b)
 
     def multiply(key: int, a: Node, b: Node) -> Node:
@@ -129,10 +130,17 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
             if set(one.form) <= {""}:
                 return table.node(key, times(other.form, one.form.get("", ZERO)), natural)
         wide, narrow = (a, b) if magnitude(a.range) >= magnitude(b.range) else (b, a)
+        if outside(narrow.form) and not outside(wide.form):
+            wide, narrow = narrow, wide
         return table.fresh(key, times(narrow.form, wide.range), natural)
 
     entries = walk(program, inputs.__getitem__, const, apply)
     return [entries[i] for i in program["outputs"]]
+
+
+def outside(form: Form) -> bool:
+    """Whether a form is of what comes from outside alone, a disturbance: it then scales the other factor."""
+    return all(symbol[:2] in ("", "d:", "w:") for symbol in form)
 
 
 def derivative(program: dict[str, Any], ranges: dict[str, Interval], tangents: dict[str, Form]) -> Form:

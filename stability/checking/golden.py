@@ -31,31 +31,47 @@ SHARE, TINIEST = 1e-9, 1e-300
 def _golden_one(vector: dict[str, Any], claim: Claim) -> list[tuple[float, Any]]:
     """What follows and what is recorded, for every component."""
     n, k = len(claim.rows), len(claim.controlled)
-    x, r, theta = (
-        [float(v) for v in numbers(vector[key], count, "golden")] for key, count in (("x", n), ("r", 4), ("theta", k))
+    x, r, theta, phi = (
+        [float(v) for v in numbers(vector[key], count, "golden")]
+        for key, count in (("x", n), ("r", 4), ("theta", k), ("phi", k))
     )
     named = {row["state"]: value for row, value in zip(claim.rows, x, strict=True)}
     named |= {f"r{j}": value for j, value in enumerate(r)}
     named |= {f"nominal.{name}": float(value) for name, value in claim.nominal.items()}
-    foreseen = numbers(vector.get("load", []), len(claim.feedforward), "golden")
-    named |= {f"nominal.{name}": float(value) for name, value in zip(claim.feedforward, foreseen, strict=True)}
+    known = [name for name in claim.feedforward if name not in claim.nominal]
+    foreseen = numbers(vector.get("load", []), len(known), "golden")
+    named |= {f"nominal.{name}": float(value) for name, value in zip(known, foreseen, strict=True)}
     virtual: dict[int, float] = {}
-    following: list[float] = []
+    following, errors = [], []
     for j, i in enumerate(claim.controlled):
         target = claim.rows[i]["target"]
         goal = r[0] if target == "reference" else 0.0 if target == "zero" else virtual[target]
-        beta, epsilon, delta, sigma = (float(g) for g in claim.gains[j])
+        beta, epsilon, delta, sigma, *_ = (float(g) for g in claim.gains[j])
         error, program = x[i] - goal, claim.law[j]
         term = walk(program, named.__getitem__, float, float_apply)[program["outputs"][0]]
-        virtual[i] = -(beta + epsilon * theta[j]) * error / 2 + term
+        virtual[i] = -(beta + epsilon * theta[j]) * error / 2 + term - phi[j]
+        errors.append(error)
         step = epsilon * delta * error * error / 2 - delta * sigma * theta[j]
         following.append(theta[j] + float(claim.period) * step)
-    wanted = [virtual[row] for row in claim.input_map]
-    norm, limit = math.hypot(*wanted), float(claim.limits[0]["value"])
-    wanted = [value * (limit / max(norm, limit)) for value in wanted]
+    asked = [virtual[row] for row in claim.input_map]
+    norm, limit = math.hypot(*asked), float(claim.limits[0]["value"])
+    wanted = [value * (limit / max(norm, limit)) for value in asked]
+    learned = []
+    for j, i in enumerate(claim.controlled):
+        gamma, capacity, own = float(claim.gains[j][4]), float(claim.gains[j][5]), _input_of(claim, i)
+        held = abs(asked[own]) > abs(wanted[own]) and -errors[j] * asked[own] > 0
+        step = 0.0 if held else float(claim.period) * gamma * errors[j]
+        learned.append(min(max(phi[j] + step, -capacity), capacity))
     pairs = list(zip(wanted, numbers(vector["u"], len(wanted), "golden"), strict=True))
     pairs += zip(following, numbers(vector["theta_next"], k, "golden"), strict=True)
+    pairs += zip(learned, numbers(vector["phi_next"], k, "golden"), strict=True)
     return pairs
+
+
+def _input_of(claim: Claim, row: int) -> int:
+    """The input at the end of the chain that a row begins."""
+    following = next((j for j in claim.controlled if claim.rows[j]["target"] == row), None)
+    return claim.input_map.index(row) if following is None else _input_of(claim, following)
 
 
 def float_apply(operator: str, a: float, b: float = 0.0) -> float:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .limits import MAX_CELLS, MAX_COEFFICIENTS, MAX_MEMBERS, MAX_OPERATIONS, MAX_ROWS
+from .limits import MAX_CELLS, MAX_COEFFICIENTS, MAX_GROUPS, MAX_MEMBERS, MAX_OPERATIONS, MAX_ORDER, MAX_ROWS
 from .shape import (
     entry_of,
     flag,
@@ -72,7 +72,8 @@ STUDY = entry_of(
             {"level": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
         ),
         "uncertainty": entry_of({
-            "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit}), 8),
+            "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit},
+                                           {"rate": positive}), 8),
             "noise": named(plain_number), "initial": named(plain_number),
         }),
         "reference": entry_of(
@@ -84,7 +85,7 @@ STUDY = entry_of(
         ),
         "controller": entry_of(
             {"law": text, "modelling": listed(some(*MODELLING), 0, 8), "rate_hz": plain_number,
-             "rates_hz": named(plain_number),
+             "rates_hz": named(plain_number), "delay_s": share,
              "gains": NOTHING, "members": named(named(RANGE))},
             {"observer": entry_of(dict.fromkeys(("bandwidth_rad_s", "largest", "epsilon", "sigma"), plain_number))},
         ),
@@ -107,12 +108,15 @@ PROGRAM = entry_of({"inputs": listed(text, 0, 200), "operations": listed(operati
                     "outputs": listed(whole, 1, 64)})  # fmt: skip
 EXACT = listed(ratio, 1, MAX_ROWS)
 CERTIFICATE = entry_of(
-    {"kind": text, "decay": ratio, "half_widths": EXACT, "input_bound": EXACT,
+    {"kind": text, "half_widths": EXACT, "input_bound": EXACT,
+     "networks": listed(entry_of(dict.fromkeys(("row", "low", "high", "middle", "bound"), ratio) | {"row": name}),
+                        0, MAX_ROWS),
+     "force": listed(EXACT, 1, MAX_ROWS), "drive": listed(EXACT, 1, MAX_ROWS), "split": listed(whole, 1, MAX_ROWS),
+     "cells": listed(entry_of({"columns": listed(listed(ratio, 1, MAX_ORDER), 1, MAX_ORDER),
+                               "blocks": listed(whole, 1, MAX_ORDER), "groups": listed(whole, 1, MAX_GROUPS),
+                               "growth": ratio}), 1, MAX_CELLS),
      "envelope": entry_of({"rate": ratio, "ultimate": EXACT})},
-    {"guarantee": listed(ratio, 3, 3), "weights": EXACT, "young": EXACT, "leak": EXACT,
-     "split": listed(whole, 1, MAX_ROWS),
-     "cells": listed(entry_of({"transform": listed(EXACT, 1, MAX_ROWS), "reach": EXACT, "start": EXACT,
-                               "shape": EXACT}), 1, MAX_CELLS)},
+    {"guarantee": listed(ratio, 3, 3)},
 )  # fmt: skip
 MEMBER = entry_of(
     {
@@ -138,7 +142,7 @@ MEMBER = entry_of(
         }),
         "certificate": CERTIFICATE,
         "golden": listed(entry_of(
-            {key: listed(plain_number, 1, MAX_ROWS) for key in ("x", "r", "theta", "u", "theta_next")},
+            dict.fromkeys(("x", "r", "theta", "phi", "u", "theta_next", "phi_next"), listed(plain_number, 1, MAX_ROWS)),
             {"load": listed(plain_number, 1, 1)}), 20, 100),
     },
     {"observer": entry_of({"first": plain_number, "second": plain_number, "pole": plain_number})},

@@ -8,31 +8,23 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 
-#: What must be proved of every member whatever its law.
-COMMON = (
-    "plant",
-    "non-vacuity",
-    "reference",
-    "invariance",
-    "authority",
-    "sampling",
-    "adaptation",
-    "rounding",
-    "accuracy",
-)
 SCHEMA = "hdmm-opt/gains/2"
 #: What must be proved of each member for its law and its kind of certificate; a file that leaves one out is refused.
 REQUIRED = {
     "rac": {
-        "composition": ("composition", *COMMON),
-        "sampled": ("contraction", *COMMON),
+        "impulse": (
+            "plant", "non-vacuity", "reference", "contraction", "small gain", "invariance", "authority", "adaptation",
+            "rounding", "accuracy",
+        ),
     }
-}
-#: Vectors of each kind of certificate.
-VECTORS = {"composition": ("weights", "young", "leak"), "sampled": ("reach", "start", "shape")}
+}  # fmt: skip
 MAX_BYTES, MAX_DIGITS, MAX_EXPONENT, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 2_000_000, 60, 60, 12_000, 8, 1_000
-#: Cells of a sampled certificate.
-MAX_CELLS = 64
+#: Cells of a certificate, states of a loop with all that it remembers, groups of periods that are summed.
+MAX_CELLS, MAX_ORDER, MAX_GROUPS = 64, 24, 400
+#: Largest number of periods in a group, and of periods of delay.
+MAX_GROUP, MAX_DELAY = 2_000, 8
+#: A parameter that may change in a run: faults take effectiveness.
+VARYING = "effectiveness"
 #: A range of an assumption is that of the study to this share: it is written rounded outwards.
 ROUND = Fraction(1, 10**12)
 #: A place is met and a duration kept to this share of its size and a picometre or picosecond; a limit to that share.
@@ -54,8 +46,8 @@ SPEED_PARTS, LOAD_PARTS = 48, 4
 #: Relative width given to every gain, so that the proof holds for its decimal, its float64 and its float32.
 ROUNDING = Fraction(1, 2**23)
 BITS, MAX_SHIFT = 96, 3_000
-#: Fixed-point bits of matrix exponentials, terms of their series, largest norm, and a bound on all their errors.
-FIXED, TERMS, MAX_NORM, FIXED_ERROR = 192, 120, 20, Fraction(1, 2**100)
+#: Fixed-point bits of matrices, terms of an exponential's series, and its largest norm.
+FIXED, TERMS, MAX_NORM = 160, 120, 20
 #: Fractional bits of the fixed-point intervals of a coupling, and bits beyond which nothing is proved.
 SCALE, MAX_FIXED = 160, 1_000
 #: A unit, such as "kg m^2", "N m" or "rad/s".

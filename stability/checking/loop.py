@@ -1,53 +1,61 @@
-"""The closed loop in error coordinates: M_i Q_i' = sum S_ij Q_j + d_i over the assumed box.
+"""The closed loop around the moving operating point, with the input as it is held.
 
-Obligations: composition, sampling, adaptation. Must fail: a sign of plant or law, a smaller box, more noise.
+Theorem: interval enclosures of every coefficient (docs/proof.md). Must fail: a sign of plant or law, a smaller box,
+more noise, a demand that a network cannot meet.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
 
-from .arithmetic import ONE, ZERO, Interval, add, down, inverse, magnitude, neg, symmetric, up
+from .arithmetic import ONE, ZERO, Interval, add, down, inverse, magnitude, mul, neg, symmetric, up
 from .claim import Claim, Gain
 from .forms import Form, Node, Table, derivative, linear, plus, times
-from .limits import NotProvedError, need
+from .limits import VARYING, NotProvedError, need
 from .parsing import reads
 
 
 class Loop:
-    """M_i Q_i' = sum_j S_ij Q_j + d_i over the assumed box, with every entry an interval."""
+    """M_i z_i' = sum_j J_ij z_j + sum_k B_ik v_k + d_i + M_i φ*_j' around the operating point x*(t).
 
-    moving = "Q"
+    The symbols Q are the deviations z = x - x*, the symbols e the inputs v, the symbols p the demands φ* of the load
+    networks. x* follows from the reference and the demands: the term of a tracked row must not read a state.
+    """
 
     def __init__(self, claim: Claim, inflate: Fraction) -> None:
+        tracked = {row["target"] for row in claim.rows}
+        states = {row["state"] for row in claim.rows}
+        for i, term in zip(claim.controlled, claim.law, strict=True):
+            need(i not in tracked or not states & reads(term), "the modelling term of a tracked row reads a state")
         self.claim, self.table = claim, Table()
         self.gain: dict[int, Gain] = {}
         for i, values in zip(claim.controlled, claim.gains, strict=True):
-            self.gain[i] = Gain(*((v * (1 - inflate), v * (1 + inflate)) for v in values))
+            wide = [(v * (1 - inflate), v * (1 + inflate)) for v in values[:5]]
+            self.gain[i] = Gain(*wide, capacity=values[5], preload=values[6])
         self.term = dict(zip(claim.controlled, claim.law, strict=True))
-        self.theta: dict[int, Fraction] = {}
-        self.theta_rate: dict[int, Fraction] = {}
         self.half: dict[int, Interval] = {}
-        self.noise: dict[int, Fraction] = {}
         self.model: dict[int, Form] = {}
         self.nodes: dict[str, Node] = {}
-        self.virtual: dict[int, Form] = {}
         self._inputs()
         self._rows()
 
     def _inputs(self) -> None:
         claim, table = self.claim, self.table
         fixed = {f"nominal.{name}": (value, value) for name, value in claim.nominal.items()}
-        for name, bounds in {**fixed, **claim.parameters, **claim.disturbances}.items():
-            key = ("const", bounds[0]) if bounds[0] == bounds[1] else ("input", name)
-            self.nodes[name] = Node(table.key(*key), {"": bounds}, bounds)
+        for name, bounds in {**fixed, **claim.parameters}.items():
+            self._stated(name, bounds, changing=name == VARYING)
+        for name, bounds in claim.disturbances.items():
+            self._stated(name, bounds, changing=True)
         for name, (bounds, _) in claim.feedforward.items():
             table.ranges[f"w:{name}"] = bounds
-            self._name(f"nominal.{name}", {f"w:{name}": ONE})
-            self._name(name, {f"w:{name}": ONE, "": claim.disturbances[name]})
+            if name not in claim.nominal:
+                self._name(f"nominal.{name}", {f"w:{name}": ONE})
+            self._name(name, plus({f"w:{name}": ONE}, self.nodes[name].form))
         for k, bounds in enumerate(claim.reference):
             table.ranges[f"r{k}"] = bounds
             self._name(f"r{k}", {f"r{k}": ONE})
+        for i, bounds in zip(claim.networks, claim.demand, strict=True):
+            table.ranges[f"p{i}"] = bounds
         for i, radius in enumerate(claim.half_widths):
             table.ranges[f"Q{i}"] = symmetric(radius)
         for k, error in enumerate(claim.input_bound):
@@ -62,6 +70,16 @@ class Loop:
     def _name(self, name: str, form: Form) -> None:
         self.nodes[name] = Node(self.table.key("input", name), form, self.table.over(form))
 
+    def _stated(self, name: str, bounds: Interval, *, changing: bool) -> None:
+        """What may change at any time is a symbol of its own, so that the coefficients of others are constant."""
+        if bounds[0] == bounds[1]:
+            self.nodes[name] = Node(self.table.key("const", bounds[0]), {"": bounds}, bounds)
+        elif changing:
+            self.table.ranges[f"d:{name}"] = bounds
+            self._name(name, {f"d:{name}": ONE})
+        else:
+            self.nodes[name] = Node(self.table.key("input", name), {"": bounds}, bounds)
+
     def _target(self, i: int) -> Form:
         target = self.claim.rows[i]["target"]
         if target == "reference":
@@ -69,39 +87,39 @@ class Loop:
         return {} if target == "zero" else self._kappa(target)
 
     def _kappa(self, i: int) -> Form:
+        """The operating value of row i's control: m_i, less φ*_i where it has a network."""
         self._control(i)
-        return plus({f"K{i}": ONE}, self.model[i])
+        return plus(self.model[i], {f"p{i}": neg(ONE)}) if i in self.claim.networks else self.model[i]
 
     def _control(self, i: int) -> None:
-        """θ̂_i in [0, ε(R+N)²/(2σ)], the gain in [½β, ½B], the modelling term."""
+        """θ̂_i in [0, ε(R+N)²/(2σ)], the gain b in [½β, ½B], the modelling term."""
         if i in self.half:
             return
-        gain, noise = self.gain[i], self._noise(i)
-        peak = (self._error(i) + noise) ** 2
-        theta = up(gain.epsilon[1] * peak / (2 * gain.sigma[0]))
-        drive = max(gain.delta[1] * gain.sigma[1] * theta, gain.epsilon[1] * gain.delta[1] * peak / 2)
-        self.theta[i], self.theta_rate[i] = theta, up(drive)
+        gain = self.gain[i]
+        theta = up(gain.epsilon[1] * (self._error(i) + self.noise(i)) ** 2 / (2 * gain.sigma[0]))
         self.half[i] = down(gain.beta[0] / 2), up((gain.beta[1] + gain.epsilon[1] * theta) / 2)
-        self.table.definitions[f"K{i}"] = {f"Q{i}": neg(self.half[i])}
-        self.table.ranges[f"K{i}"] = self.table.over(self.table.definitions[f"K{i}"])
         need(reads(self.term[i]) <= set(self.nodes), "a modelling term reads a state that comes later")
         self.model[i] = linear(self.term[i], self.nodes, self.table)[0].form
 
     def _error(self, i: int) -> Fraction:
-        """Bound on |Q_i|."""
-        return self.claim.half_widths[i]
+        """Bound on |Q_i|: z_i, what its target asks for, and what its network misses."""
+        claim, target = self.claim, self.claim.rows[i]["target"]
+        if isinstance(target, str):
+            return claim.half_widths[i]
+        missed = claim.network_bound[claim.networks.index(target)] if target in claim.networks else Fraction(0)
+        return claim.half_widths[i] + self.half[target][1] * self._error(target) + missed
 
-    def _noise(self, i: int) -> Fraction:
+    def noise(self, i: int) -> Fraction:
+        """Bound on the error of the Q_i that the controller computes."""
         target, own = self.claim.rows[i]["target"], self.claim.noise[i]
-        upstream = Fraction(0) if isinstance(target, str) else self._control_noise(target)
-        self.noise[i] = own + upstream
-        return self.noise[i]
+        if isinstance(target, str):
+            return own
+        return own + up(self.half[target][1] * self.noise(target) + self.term_noise(target))
 
-    def _control_noise(self, i: int) -> Fraction:
-        """What measurement errors make of κ_i."""
+    def term_noise(self, i: int) -> Fraction:
+        """What measurement errors make of a modelling term."""
         shaken = {r["state"]: {"": symmetric(n)} for r, n in zip(self.claim.rows, self.claim.noise, strict=True)}
-        direct = magnitude(derivative(self.term[i], self._ranges(), shaken).get("", ZERO))
-        return up(self.half[i][1] * self.noise[i] + direct)
+        return magnitude(derivative(self.term[i], self._ranges(), shaken).get("", ZERO))
 
     def _ranges(self) -> dict[str, Interval]:
         ranges = {name: node.range for name, node in self.nodes.items()}
@@ -116,56 +134,104 @@ class Loop:
         self.mass = [value.range for value in values[:n]]
         if min(mass[0] for mass in self.mass) <= 0:
             raise NotProvedError("an inertia can vanish inside the assumptions")
-        forces = [table.expand(value.form, keep="K") for value in values[n:]]
+        raw = [value.form for value in values[n:]]
+        forces = [table.expand(form) for form in raw]
         moving = {r["state"]: times(f, inverse(m)) for r, f, m in zip(claim.rows, forces, self.mass, strict=True)}
         moving |= {f"r{k}": {f"r{k + 1}": ONE} for k in range(3)}
         moving |= {f"nominal.{name}": {"": rate} for name, (_, rate) in claim.feedforward.items()}
-        self.open: list[Form] = []
+        self.virtual: dict[int, Form] = {}
+        self.closed: list[Form] = []
+        self.disturbance: list[Fraction] = []
+        self.demand: list[Interval] = []
+        self.demand_rate: list[Fraction] = []
+        self.settled: list[Fraction] = []
+        places = [claim.rest[0], Fraction(0), Fraction(0), Fraction(0)]
+        self.resting: dict[str, Interval] = {f"r{k}": (place, place) for k, place in enumerate(places)}
         for i, row in enumerate(claim.rows):
             rate = {"r1": ONE} if row["target"] == "reference" else {}
             rate = self.virtual[row["target"]] if isinstance(row["target"], int) else rate
-            self.open.append(plus(forces[i], times(rate, neg(self.mass[i]))))
+            self.closed.append(plus(forces[i], times(rate, neg(self.mass[i]))))
             if i in self.gain:
-                self.virtual[i] = self._virtual_rate(i, moving)
-        self.closed = [table.expand(form) for form in self.open]
-        rest = [{s: c for s, c in f.items() if s[:1] not in self.moving or not s} for f in self.closed]
-        self.disturbance = [magnitude(table.over(form)) for form in rest]
+                self.virtual[i] = table.expand(derivative(self.term[i], self._ranges(), moving))
+            if i in claim.networks:
+                self.disturbance.append(self._demanded(i, raw[i], rate))
+            else:
+                self.disturbance.append(magnitude(self._left(self.closed[i])))
 
-    def _virtual_rate(self, i: int, moving: dict[str, Form]) -> Form:
-        """κ_i' = -½(β + εθ̂) Q_i' - ½ε θ̂' Q_i + m_i'."""
-        error_rate = times(self.open[i], inverse(self.mass[i]))
-        adapting = symmetric(up(self.gain[i].epsilon[1] * self.theta_rate[i] / 2))
-        term_rate = self.table.expand(derivative(self.term[i], self._ranges(), moving), keep="K")
-        return plus(times(error_rate, neg(self.half[i])), {f"Q{i}": adapting}, term_rate)
+    def _left(self, form: Form) -> Interval:
+        """Range of what is neither a deviation nor an input."""
+        return self.table.over({s: c for s, c in form.items() if s[:1] not in ("Q", "e")})
+
+    def _demanded(self, i: int, raw: Form, rate: Form) -> Fraction:
+        """What φ*_i meets of row i, and how fast; returns the disturbance that is left.
+
+        Only constant coefficients count: those of the force before nonlinear operations are replaced by what bounds
+        them, and those of the target's rate that are numbers.
+        """
+        claim, table = self.claim, self.table
+        place = claim.networks.index(i)
+        changes = {f"r{k}": claim.reference[k + 1] for k in range(3)}
+        changes |= {f"w:{name}": change for name, (_, change) in claim.feedforward.items()}
+        shift = {s: c for s, c in rate.items() if s in changes and c[0] == c[1]}
+        met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[i])))
+        middle = {"": (claim.middle[place], claim.middle[place])}
+        level = table.over(plus(met, middle))
+        change = max((abs(end) for end in table_sum(met, changes)), default=Fraction(0))
+        drive, constant = neg(raw.get(f"p{i}", ZERO)), True
+        if not drive[0] > 0:
+            drive, constant = neg(self.closed[i].get(f"p{i}", ZERO)), False
+        if not drive[0] > 0:
+            raise NotProvedError(f"the load network of row {i + 1} has no effect of a known sign")
+        known = {*changes, f"p{i}"} if constant else {*changes}
+        rest = table.expand({s: c for s, c in raw.items() if s not in known})
+        late = {s: c for s, c in rate.items() if s not in shift}
+        rest = plus(rest, times(late, neg(self.mass[i])), times(middle, neg(ONE)))
+        least = drive[0]
+        if not constant:  # where the effect of φ̂ may change, φ* is for its middle
+            centre = down((drive[0] + drive[1]) / 2)
+            around = max(drive[1] - centre, centre - drive[0])
+            drive = centre, centre
+            rest = plus({s: c for s, c in rest.items() if s != f"p{i}"},
+                        {"": symmetric(around * magnitude(mul(level, inverse(drive))))})  # fmt: skip
+        left = magnitude(self._left(rest))
+        self.demand.append(mul(level, inverse(drive)))
+        still = table_sum(plus(met, middle), {**table.ranges, **self.resting})
+        self.resting[f"p{i}"] = mul(still, inverse(drive))
+        self.demand_rate.append(up(change / drive[0]))
+        self.settled.append(up(left / least))
+        return left
 
     def entry(self, i: int, j: int) -> Interval:
-        """S_ij."""
+        """J_ij."""
         return self.closed[i].get(f"Q{j}", ZERO)
 
-    def own_gain(self, i: int) -> Fraction:
-        """The smallest effect of the own virtual control."""
-        return self.open[i].get(f"K{i}", ZERO)[0]
-
-    def input_error(self, k: int) -> Fraction:
-        """T_s sup|κ'| plus what noise adds: bounds |u_k - κ_k(t)| within a period."""
-        row = self.claim.input_map[k]
-        speed = magnitude(self.table.over(self.table.expand(self.virtual[row])))
-        return self.claim.period * speed + self._control_noise(row)
+    def late(self, k: int) -> Fraction:
+        """What the modelling term of input k changes until it acts."""
+        change = magnitude(self.table.over(self.virtual[self.claim.input_map[k]]))
+        return (self.claim.period + self.claim.delay) * change
 
     def signal(self, name: str) -> Fraction:
         """Bound on |input| as commanded, or on |state|."""
         if name not in self.claim.inputs:
             return magnitude(self.nodes[name].range)
-        row = self.claim.input_map[self.claim.inputs.index(name)]
-        return magnitude(self.table.over(self._kappa(row))) + self._beyond(row)
+        k = self.claim.inputs.index(name)
+        return magnitude(self.table.over(self._kappa(self.claim.input_map[k]))) + self.claim.input_bound[k]
 
-    def _beyond(self, row: int) -> Fraction:
-        """What a commanded input may be more than its form says."""
-        return self._control_noise(row)
+    def size(self, name: str, deviations: list[Fraction], *, resting: bool) -> Fraction:
+        """Bound on |input| as commanded, or on |state|, for bounds on |z| and |v|, in motion or at rest at first."""
+        claim, n = self.claim, len(self.claim.rows)
+        known = {**self.table.ranges, **(self.resting if resting else {})}
+        known |= {f"Q{i}": symmetric(r) for i, r in enumerate(deviations[:n])}
+        if name in claim.inputs:
+            k = claim.inputs.index(name)
+            return magnitude(table_sum(self._kappa(claim.input_map[k]), known)) + deviations[n + k]
+        i = next(i for i, row in enumerate(claim.rows) if row["state"] == name)
+        return magnitude(table_sum(self._target(i), known)) + deviations[i]
 
-    def adaptation_residual(self, i: int) -> Fraction:
-        """What sampling and noise add to θ̂' in the Lyapunov function."""
-        gain, period = self.gain[i], self.claim.period
-        error = period * magnitude(self.table.over(self.closed[i])) / self.mass[i][0] + self.noise[i]
-        squares = gain.epsilon[1] * gain.delta[1] * error * (2 * self.claim.half_widths[i] + error) / 2
-        return up(gain.delta[1] * gain.sigma[1] * period * self.theta_rate[i] + squares)
+
+def table_sum(form: Form, ranges: dict[str, Interval]) -> Interval:
+    """Range of a form over given ranges of its symbols."""
+    total = ZERO
+    for symbol, value in form.items():
+        total = add(total, mul(value, ranges[symbol]))
+    return total

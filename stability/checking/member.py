@@ -6,17 +6,16 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from .arithmetic import up
 from .claim import Claim
 from .course import follows
 from .golden import golden_agree
+from .impulse import Impulse
 from .limits import REQUIRED, need
 from .loop import Loop
 from .obligation import Obligation, Use, downward
 from .obligations import obligations, uses
 from .parsing import number
 from .reading import read
-from .sampled import Held
 from .statement import consistent
 from .structure import different, well_formed
 
@@ -42,6 +41,8 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     """Re-prove one member under its own assumptions."""
     entry = data["members"][which]
     claim = read(data, entry, coupled)
+    linked = coupled or data["study"]["controller"].get("observer") is not None
+    need(not (linked and 0 in claim.networks), "a first row with a load network is of a member that nothing links")
     consistent(data, entry, claim)
     follows(data, entry, claim, which)
     well_formed(claim)
@@ -51,28 +52,27 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     seen = number(data["validation"]["members"][claim.name]["largest_error"], "largest_error")
     need(seen >= 0, "largest_error must not be negative")
     rate = number(entry["certificate"]["envelope"]["rate"], "rate")
-    required = REQUIRED[data["study"]["controller"]["law"]][claim.kind]
+    required = REQUIRED[data["study"]["controller"]["law"]][entry["certificate"]["kind"]]
     need(sorted(o.name for o in made) == sorted(required), "the checker has not decided what the law needs")
     failed = ""
     wrong = [o for o in made if o.verdict != "proved"]
     if wrong:
         failed = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"
-    elif not rate <= claim.decay / (2 if claim.kind == "composition" else 1):
+    elif not rate <= verdict.rate():
         failed = "the envelope states a faster rate"
     elif not agree:
         failed = "the golden vectors do not follow from the gains and the law"
     elif seen > claim.half_widths[0]:
         failed = "the recorded simulation leaves the certified envelope"
-    tube = tube_of(claim, verdict) if isinstance(verdict, Held) and len(claim.rows) > accelerating(claim) else None
-    return Member(claim.name, claim, loop, made, tube, verdict.ultimate(0), uses(claim, loop), failed)
+    tube = tube_of(claim, verdict) if len(claim.rows) > accelerating(claim) else None
+    return Member(claim.name, claim, loop, made, tube, verdict.ultimate(0), uses(claim, loop, verdict), failed)
 
 
-def tube_of(claim: Claim, verdict: Held) -> tuple[Fraction, Fraction, Fraction]:
+def tube_of(claim: Claim, verdict: Impulse) -> tuple[Fraction, Fraction, Fraction]:
     """Bounds on the deviations of position, speed and acceleration for all t; no position where a speed comes first."""
     row = accelerating(claim)
-    rate = max(period.speeds(period.cell.start)[row] for period in verdict.periods)
     position = claim.half_widths[0] if row else Fraction(0)
-    return position, claim.half_widths[row], up(rate * claim.half_widths[row] / claim.period)
+    return position, claim.half_widths[row], verdict.speed(row)
 
 
 def accelerating(claim: Claim) -> int:

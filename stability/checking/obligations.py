@@ -1,6 +1,6 @@
 """All obligations of a member, decided.
 
-Obligations: non-vacuity, reference, authority, adaptation, rounding, accuracy, and those of the certificate's kind.
+Obligations: plant, non-vacuity, reference, authority, adaptation, rounding, accuracy, and those of the certificate.
 Must fail: lower limits, a shorter stroke, a tighter requirement, a faster adaptation than the rate allows.
 """
 
@@ -10,49 +10,18 @@ from fractions import Fraction
 
 from .arithmetic import root, up
 from .claim import Claim
-from .composition import Composed
-from .deviation import Deviation
 from .effects import effects_of
+from .impulse import Impulse
 from .limits import LEAST_EFFECT, LEAST_LOAD, ROUNDING, NotProvedError
 from .loop import Loop
-from .obligation import Obligation, Use, below, decided, milli, percent, upward
-from .sampled import Held
+from .obligation import Obligation, Use, below, decided, downward, milli, percent, upward
 
 
-def judge(claim: Claim, inflate: Fraction) -> tuple[Loop, Composed | Held]:
-    """The closed loop for all gains within a relative distance, and the verdicts on it."""
-    if claim.kind == "sampled":
-        moved = Deviation(claim, inflate)
-        return moved, Held(claim, moved)
-    loop = Loop(claim, inflate)
-    return loop, Composed(claim, loop)
-
-
-def holds(claim: Claim, loop: Loop, verdict: Composed | Held) -> bool:
-    """All obligations that depend on the gains."""
-    return (
-        verdict.contracts()
-        and verdict.invariance() > 0
-        and all(slack > 0 for slack, _, _ in authority(claim, loop))
-        and verdict.sampling()[1] > 0
-        and adaptation(claim, loop) >= 0
-        and verdict.ultimate(0) <= claim.accuracy
-    )
-
-
-def holds_within(claim: Claim, inflate: Fraction) -> bool:
-    """The same for every gain within a relative distance."""
-    try:
-        return holds(claim, *judge(claim, inflate))
-    except NotProvedError:
-        return False
-
-
-def authority(claim: Claim, loop: Loop) -> list[tuple[Fraction, str, str]]:
+def authority(claim: Claim, loop: Loop, verdict: Impulse) -> list[tuple[Fraction, str, str]]:
     """Distance of each limited norm from its limit over the certified set; then the stroke."""
     result = []
     for limit in claim.limits:
-        norm = root(up(sum((loop.signal(s) ** 2 for s in limit["signals"]), Fraction(0))), True)
+        norm = root(up(sum((verdict.largest(s) ** 2 for s in limit["signals"]), Fraction(0))), True)
         result.append((limit["value"] - norm, str(limit["unit"]), str(limit["name"])))
     position = loop.nodes[claim.rows[0]["state"]].range
     unit = str(claim.rows[0]["unit"])
@@ -60,34 +29,27 @@ def authority(claim: Claim, loop: Loop) -> list[tuple[Fraction, str, str]]:
     return result
 
 
-def adaptation(claim: Claim, loop: Loop) -> Fraction:
-    """1 - T_s δσ keeps sampled θ̂ >= 0; δσ >= μ wherever θ̂ is part of V."""
-    slack = Fraction(1)
-    for i, gain in loop.gain.items():
-        slack = min(slack, 1 - claim.period * gain.delta[1] * gain.sigma[1])
-        if claim.kind == "composition" and claim.leak[i] > 0:
-            slack = min(slack, gain.delta[0] * gain.sigma[0] / claim.decay - 1)
-    return slack
+def adaptation(claim: Claim, loop: Loop, verdict: Impulse) -> tuple[Fraction, str]:
+    """1 - T_s δσ keeps sampled θ̂ >= 0; |φ̂| < Φ keeps every network from its bound. The smaller one, and what it is."""
+    slack = [(1 - claim.period * g.delta[1] * g.sigma[1], "theta stays 0 or more") for g in loop.gain.values()]
+    for i, size in zip(claim.networks, verdict.estimates(), strict=True):
+        state, capacity = claim.rows[i]["state"], loop.gain[i].capacity * (1 - ROUNDING)
+        used = percent(size / capacity, up=True) if capacity > 0 else "more than all"
+        slack.append(
+            (1 - size / capacity if capacity > 0 else Fraction(-1), f"phi of {state} uses {used} of its bound")
+        )
+    return min(slack)
 
 
 def vacuity(claim: Claim) -> Fraction:
-    """The smallest ratio of what must be inside to what holds it, turned into a margin."""
-    may_be_zero = [*claim.noise, *claim.initial]
-    positive = [claim.decay, claim.period, claim.accuracy, *claim.half_widths]
-    positive += [v for cell in claim.cells for v in (*cell.reach, *cell.start, *cell.shape)]
-    for name, values in {**claim.vectors, "input_bound": claim.input_bound}.items():
-        (may_be_zero if name == "leak" or (name, claim.kind) == ("input_bound", "composition") else positive).extend(
-            values
-        )
+    """1 where everything that must be positive is, and -1 elsewhere."""
+    may_be_zero = [*claim.noise, *claim.initial, claim.delay]
+    positive = [claim.period, claim.accuracy, *claim.half_widths, *claim.input_bound, *claim.network_bound]
     positive += [limit["value"] for limit in claim.limits] + [claim.stroke[1] - claim.stroke[0]]
-    if min(positive) <= 0 or min(may_be_zero) < 0:
-        return Fraction(-1)
-    if claim.kind == "sampled":
-        return Fraction(1)
-    return min(1 - initial / radius for initial, radius in zip(claim.initial, claim.half_widths, strict=True))
+    return Fraction(-1 if min(positive) <= 0 or min(may_be_zero) < 0 else 1)
 
 
-def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
+def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Impulse]:
     """Decide every obligation of the law; with the closed loop, and the verdicts on it."""
     made: list[Obligation] = []
 
@@ -95,11 +57,12 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
         made.append(decided(name, statement, margin, unit, remedy, member=claim.name, strict=strict))
 
     anew = "a certificate made for these gains and assumptions: run design again"
-    statement = "the box is not empty, holds the initial errors, and no limit is zero"
-    state("non-vacuity", statement, vacuity(claim), "1", "positive limits, and a box larger than the initial errors")
+    statement = "the box is not empty, and no limit is zero"
+    state("non-vacuity", statement, vacuity(claim), "1", "positive limits and bounds")
     if made[0].verdict != "proved":
         raise NotProvedError("the certificate is about an empty set (obligation non-vacuity)")
-    loop, verdict = judge(claim, ROUNDING)
+    loop = Loop(claim, ROUNDING)
+    verdict = Impulse(claim, loop)
     ranges = {row["state"]: loop.nodes[row["state"]].range for row in claim.rows}
     ranges |= {name: (-loop.signal(name), loop.signal(name)) for name in claim.inputs}
     effects = effects_of(claim, ranges)
@@ -118,22 +81,22 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Composed | Held]:
     statement = "the reference is continuous to its acceleration, ends at rest and stays inside the stroke"
     unit = str(claim.rows[0]["unit"])
     state("reference", statement, inside, unit, f"waypoints {float(-inside):.3g} {unit} further inside the stroke")
-    name, statement, spare = verdict.contraction()
-    state(name, statement, spare, "1/s", anew, False)
+    statement = f"from period to period what a start makes shrinks at {downward(verdict.rate())} 1/s or more"
+    state("contraction", statement, verdict.contraction(), "1", anew)
+    delayed = f", {upward(claim.delay, 3)} s late" if claim.delay else ""
+    statement = f"the loop at {float(1 / claim.period):g} Hz{delayed} bears what is uncertain of it"
+    state("small gain", statement, verdict.small_gain(), "1", f"a faster rate, or {anew}")
     state("invariance", "no trajectory from the initial set leaves the assumed box", verdict.invariance(), "1", anew)
-    slack, unit, which = min(authority(claim, loop), key=lambda entry: entry[0] / scale(claim, entry[2]))
+    slack, unit, which = min(authority(claim, loop, verdict), key=lambda entry: entry[0] / scale(claim, entry[2]))
     used = percent(1 - slack / scale(claim, which), up=True)
     statement = f"every limit holds over the certified set; the tightest is {which}, of which {used} are used"
     state("authority", statement, slack, unit, f"a limit on {which} that is {float(-slack) * 1.001:.4g} {unit} wider")
-    statement, spare = verdict.sampling()
-    state("sampling", f"{statement} at {float(1 / claim.period):g} Hz", spare, "1", f"a faster rate, or {anew}")
-    statement = "sampled adaptation keeps theta >= 0, and delta sigma >= mu where theta is in V"
+    spare, statement = adaptation(claim, loop, verdict)
     faster = max(float(g.delta[1] * g.sigma[1]) for g in loop.gain.values())
-    state("adaptation", statement, adaptation(claim, loop), "1", f"a rate of at least {faster:.4g} Hz", False)
-    least = ROUNDING if holds(claim, loop, verdict) else Fraction(-1)
-    wider = (step for step in (Fraction(1, 1000), Fraction(1, 10000)) if holds_within(claim, step))
-    statement = "everything holds for the gains as decimal, float64 and float32"
-    state("rounding", statement, next(wider, least), "1", "what the other obligations need")
+    remedy = f"a rate of at least {faster:.4g} Hz, and a larger phi"
+    state("adaptation", f"no adaptive state reaches its bounds: {statement}", spare, "1", remedy, False)
+    statement = "everything here holds for the gains as decimal, float64 and float32"
+    state("rounding", statement, ROUNDING, "1", "what the other obligations need")
     error = verdict.ultimate(0)
     unit = str(claim.rows[0]["unit"])
     statement = f"from {upward(claim.transient, 6)} s on the tracking error is at most {milli(error, unit)}"
@@ -150,6 +113,9 @@ def scale(claim: Claim, name: str) -> Fraction:
     return next((limit["value"] for limit in claim.limits if limit["name"] == name), half)
 
 
-def uses(claim: Claim, loop: Loop) -> list[Use]:
+def uses(claim: Claim, loop: Loop, verdict: Impulse) -> list[Use]:
     """The share of every limit that is certified to be used at most."""
-    return [Use(claim.name, name, -below(slack / scale(claim, name) - 1)) for slack, _, name in authority(claim, loop)]
+    return [
+        Use(claim.name, name, -below(slack / scale(claim, name) - 1))
+        for slack, _, name in authority(claim, loop, verdict)
+    ]

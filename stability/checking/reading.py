@@ -12,7 +12,7 @@ from typing import Any
 
 from .arithmetic import Interval, magnitude
 from .claim import Claim, cell_of
-from .limits import CARRIED, MAX_CELLS, MAX_ROWS, NAME, REQUIRED, ROUND, UNIT_TEXT, VECTORS, UnreadableError, need
+from .limits import CARRIED, MAX_CELLS, MAX_DELAY, MAX_ROWS, NAME, REQUIRED, ROUND, UNIT_TEXT, UnreadableError, need
 from .parsing import index, number, numbers, reads, valid_program
 from .reference import reference_bounds
 from .statement import stroke_of
@@ -48,10 +48,16 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     rate = number(controller.get("rates_hz", {}).get(entry["name"], controller["rate_hz"]), "rate_hz")
     transient = number(study["validation"]["transient_s"], "transient_s")
     need(rate > 0 and transient >= 0, "the control rate must be positive, the transient not negative")
-    split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]] if kind == "sampled" else []
-    cells = [cell_of(cell, n) for cell in certificate["cells"]] if kind == "sampled" else []
+    split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]]
+    cells = [cell_of(cell) for cell in certificate["cells"]]
     covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod(split)
-    need(kind != "sampled" or covered, "the cells do not cover the inertias")
+    need(covered, "the cells do not cover the inertias")
+    gains = gains_of(entry["gains"], controlled, study, entry["name"])
+    own = [states[i] for i, gain in zip(controlled, gains, strict=True) if gain[4] > 0]
+    networks = certificate["networks"]
+    need([given["row"] for given in networks] == own, "the networks are not those of the gains")
+    delay = number(controller["delay_s"], "delay_s")
+    need(delay * rate <= MAX_DELAY, f"a computing delay is of at most {MAX_DELAY} periods")
     stroke = numbers(stroke_of(section, str(rows[0]["unit"])), 2, "stroke")
     return Claim(
         name=entry["name"], rows=rows, input_map=input_map, inputs=model["inputs"], plant=plant, law=terms,
@@ -59,17 +65,34 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
         reference=reference_bounds(entry["reference"]),
         noise=[magnitude(assumed["noise"][s]) for s in states],
         initial=[magnitude(assumed["initial"][s]) for s in states],
-        period=1 / rate, gains=gains_of(entry["gains"], controlled, study, entry["name"]), kind=kind,
-        decay=number(certificate["decay"], "decay"),
-        vectors={name: numbers(certificate[name], n, name) for name in VECTORS[kind] if kind == "composition"},
-        split=split, cells=cells, half_widths=numbers(certificate["half_widths"], n, "half_widths"),
+        period=1 / rate, delay=delay, gains=gains, split=split, cells=cells,
+        force=[numbers(row, n, "force") for row in listed_of(certificate["force"], n, "force")],
+        drive=[numbers(row, m, "drive") for row in listed_of(certificate["drive"], n, "drive")],
+        half_widths=numbers(certificate["half_widths"], n, "half_widths"),
         input_bound=numbers(certificate["input_bound"], m, "input_bound"),
+        demand=[(number(given["low"], "low"), number(given["high"], "high")) for given in networks],
+        middle=[number(given["middle"], "middle") for given in networks],
+        network_bound=[number(given["bound"], "bound") for given in networks],
         ultimate=numbers(certificate["envelope"]["ultimate"], n, "ultimate"),
         limits=limits, stroke=(stroke[0], stroke[1]), accuracy=accuracy_of(study, entry["name"]),
         transient=transient,
         feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
-        first=model["first"],
+        first=model["first"], rest=rest_of(entry["reference"]["segments"], study["reference"]["dwell_s"]),
     )  # fmt: skip
+
+
+def rest_of(segments: list[dict[str, Any]], pause: Any) -> tuple[Fraction, Fraction]:
+    """Where the reference rests at first and for how long; that it does, `course.follows` decides."""
+    if not number(pause, "dwell_s") > 0:
+        return Fraction(0), Fraction(0)
+    knots = [number(v, "a knot") for v in segments[0]["knots"]]
+    return number(segments[0]["coefficients"][0], "a coefficient"), knots[-1] - knots[0]
+
+
+def listed_of(value: Any, count: int, what: str) -> list[Any]:
+    """A list of a given length."""
+    need(isinstance(value, list) and len(value) == count, f"{what} must have {count} rows")
+    return value
 
 
 def rows_of(model: dict[str, Any]) -> tuple[list[dict[str, Any]], list[int], list[int]]:
@@ -115,7 +138,6 @@ def check_names(
 ) -> None:  # fmt: skip
     """Refuse a model that reads what has no assumption, or a law that reads what a controller cannot know."""
     parameters = assumed["parameter"]
-    need(not set(nominal) & set(assumed["feedforward"]), "a foreseen disturbance has no nominal value")
     inertias = reads(plant, plant["outputs"][: len(states)])
     need(inertias <= set(parameters) - {"effectiveness"}, "an inertia depends on more than constant parameters")
     listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], "r0", "r1", "r2", "r3"]
@@ -134,13 +156,15 @@ def check_names(
 def gains_of(
     entries: list[dict[str, Any]], controlled: list[int], study: dict[str, Any], name: str
 ) -> list[tuple[Fraction, ...]]:
-    """β, ε, δ, σ of each controlled row, inside the ranges of the file and of the study."""
-    kinds = ("beta", "epsilon", "delta", "sigma")
+    """β, ε, δ, σ, γ, Φ, φ̂(0) of each controlled row, inside the ranges of the file and of the study."""
+    kinds = ("beta", "epsilon", "delta", "sigma", "gamma", "phi", "preload")
     given = {entry["name"]: number(entry["value"], entry["name"]) for entry in entries}
     names = [f"{kind}_{k + 1}" for k in range(len(controlled)) for kind in kinds]
     need(set(given) == set(names) and len(entries) == len(names), "the gains do not fit the subsystems")
     gains = [tuple(given[f"{kind}_{k + 1}"] for kind in kinds) for k in range(len(controlled))]
-    need(all(b > 0 and e >= 0 and d > 0 and s > 0 for b, e, d, s in gains), "gains must be positive")
+    good = all(b > 0 and e >= 0 and d > 0 and s > 0 and g >= 0 and phi >= abs(p) * (g > 0) >= 0
+               for b, e, d, s, g, phi, p in gains)  # fmt: skip
+    need(good, "gains must be positive, and a preload inside phi")
     ranges = study["controller"]["members"][name]
     need(set(ranges) == set(names), f"the ranges of the gains of {name} are not those of its gains")
     fixed = all(set(r) in ({"value"}, {"min", "max"}) for r in ranges.values())
@@ -181,7 +205,7 @@ def assumptions(
     )
     foreseen = set(found["feedforward"])
     need(foreseen == set(found["feedforward_rate"]), "a foreseen disturbance needs a range and a range of its rate")
-    need(foreseen <= (set(found["disturbance"]) if coupled else set()), "only the load of a coupling is foreseen")
+    need(foreseen <= set(found["disturbance"]), "what has a rate must be a disturbance")
     stated = stated_ranges(study, section, states, coupled)
     carried = {name for name in found["parameter"] if coupled and name in CARRIED}
     listed = {name for kind, name, _, _ in stated if kind == "parameter"}
@@ -196,6 +220,8 @@ def assumptions(
     if not coupled:
         disturbed = {name for kind, name, _, _ in stated if kind == "disturbance"}
         need(disturbed == set(found["disturbance"]), "the disturbances are not those of the study")
+        rated = {name for kind, name, _, _ in stated if kind == "feedforward"}
+        need(rated == foreseen, "the disturbances with a rate are not those of the study")
     return found
 
 
@@ -214,7 +240,13 @@ def stated_ranges(
         stated.append(("parameter", "effectiveness", least, Fraction(1)))
     for name, entry in {} if coupled else uncertainty["disturbances"].items():
         low, high = numbers(entry["range"], 2, name)
-        stated.append(("disturbance", name, low, high))
+        if "rate" not in entry:
+            stated.append(("disturbance", name, low, high))
+            continue
+        rate = number(entry["rate"], f"the rate of {name}")
+        need(rate > 0, f"the rate of {name} must be positive")
+        stated += [("disturbance", name, Fraction(0), Fraction(0)), ("feedforward", name, low, high),
+                   ("feedforward_rate", name, -rate, rate)]  # fmt: skip
     observed = study["controller"].get("observer") is not None
     for kind in ("noise", "initial"):
         given = uncertainty.get(kind, {})

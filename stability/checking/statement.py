@@ -16,7 +16,8 @@ from .parsing import number, reads
 #: Meaning of a gain by its kind.
 MEANINGS = {
     "beta": "proportional gain", "epsilon": "adaptation gain", "delta": "adaptation rate",
-    "sigma": "leakage of the adaptation",
+    "sigma": "leakage of the adaptation", "gamma": "gain of the load network",
+    "phi": "largest estimate of the load network", "preload": "estimate of the load network at the start",
 }  # fmt: skip
 #: Key of a stroke by the unit of the first state.
 STROKE = {"m": "stroke_m", "rad": "stroke_rad", "m/s": "stroke_m_s", "rad/s": "stroke_rad_s"}
@@ -116,8 +117,10 @@ def _gains(entry: dict[str, Any], claim: Claim, units: dict[str, str]) -> None:
         row = claim.controlled[int(place) - 1]
         state = claim.rows[row]["state"]
         following = [units[r["state"]] for r in claim.rows if r["target"] == row]
-        ratio = f"({following[0] if following else claim.limits[0]['unit']})/({units[state]})"
-        unit = {"beta": ratio, "epsilon": f"sqrt({ratio}/s)/({units[state]})", "delta": "1", "sigma": "1/s"}[kind]
+        control = following[0] if following else claim.limits[0]["unit"]
+        ratio = f"({control})/({units[state]})"
+        unit = {"beta": ratio, "epsilon": f"sqrt({ratio}/s)/({units[state]})", "delta": "1", "sigma": "1/s",
+                "gamma": f"{ratio}/s", "phi": control, "preload": control}[kind]  # fmt: skip
         need(gain["unit"] == unit, f"{gain['name']} must be in {unit}")
         need(
             gain["meaning"] == f"{MEANINGS[kind]} of subsystem {place} ({state})",

@@ -170,13 +170,21 @@ class _Algebra:
             factor, form = (a.form.constant, b.form) if a.form.is_constant else (b.form.constant, a.form)
             return self._value(key, form.scaled(factor), natural)
         wide, narrow = (a, b) if a.range.magnitude >= b.range.magnitude else (b, a)
+        if _outside(narrow.form) and not _outside(wide.form):
+            wide, narrow = narrow, wide
         return self.symbols.node(key, narrow.form.scaled(wide.range), natural)
 
     def div(self, a: Value, b: Value) -> Value:
-        return self._value(self.symbols.key("div", a.key, b.key), a.form.scaled(ONE / b.range), a.range / b.range)
+        key, form, natural = self.symbols.key("div", a.key, b.key), a.form.scaled(ONE / b.range), a.range / b.range
+        return self._value(key, form, natural) if b.form.is_constant else self.symbols.node(key, form, natural)
 
     def bounded(self, operator: str, a: Value, bounds: Interval) -> Value:
         return self.symbols.node(self.symbols.key(operator, a.key), Form(constant=bounds), bounds)
+
+
+def _outside(form: Form) -> bool:
+    """Whether a form is of what comes from outside alone, a disturbance: it then scales the other factor."""
+    return all(symbol[:2] in ("d:", "w:") for symbol in form.coefficients)
 
 
 def tangent(expression: Expression, ranges: Mapping[str, Interval], tangents: Mapping[str, Form]) -> Form:

@@ -1,108 +1,135 @@
 """The plant in deviations from a moving operating point, with the inputs as they are held between two samples.
 
-The operating point x*(t) follows from the reference alone: x*_i is r0, zero, or the modelling term of the row that x_i
-answers to. With z = x - x* and the input u_k = m_k(x, r) + v_k,
+The operating point x*(t) follows from the reference and from the demand φ*(t) that a load network estimates: x*_i is
+r0, zero, or m_j - φ*_j of the row j that x_i answers to. With z = x - x*, c = φ̂ - φ* and u = m_k - φ*_k + v_k
 
-    M_i z_i' = sum_j J_ij z_j + sum_k B_ik v_k + d_i,      Q = (I + b) z,      v = -K z(t_k) + noise + drift.
+    M_i z_i' = sum_j J_ij z_j + sum_k B_ik v_k + d_i + M_i φ*_j',      Q_i = z_i + b_j Q_j + c_j,      v = -b Q - c
 
-Products and tanh are enclosed as in `form.py`; what plant and law share cancels.
+where j is the row that row i tracks. In a row with a network φ* is what the constant coefficients of h_i make of
+signals of bounded rate, and a constant; what is left, and what has no bounded rate, is d. Products and tanh are
+enclosed as in `form.py`; what plant and law share cancels.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..enclosures.form import ONE, Form
-from ..enclosures.interval import Interval
+from ..enclosures.interval import Interval, total
+from .box import Box, DeviationRows, UnboundedError, over
 from .model import Bounds, Gains, LoopModel
 from .rows import Builder
 
 Array = NDArray[np.float64]
 
+#: A bound on what is not known yet.
+NOTHING = 1e-9
 #: Gains may be rounded to float32 on their way into a machine; the bounds cover twice that.
 ROUNDED = Interval(1 - 2.0**-22, 1 + 2.0**-22)
 
 
-@dataclass(frozen=True, kw_only=True)
-class DeviationRows:
-    """Enclosures that hold while |z_i| <= half_widths_i and |v_k| <= input_bound_k.
+def networks(model: LoopModel, gains: tuple[Gains, ...]) -> list[int]:
+    """The rows with a load network."""
+    return [i for i, g in zip(model.controlled, gains, strict=True) if g.gamma > 0]
 
-    Attributes:
-        low: Lower ends of J. Shape (n, n).
-        high: Upper ends of J. Shape (n, n).
-        input_low: Lower ends of B. Shape (n, m).
-        input_high: Upper ends of B. Shape (n, m).
-        disturbance: Bounds on |d_i|. Shape (n,).
-        mass_low: Lower ends of M. Shape (n,).
-        mass_high: Upper ends of M. Shape (n,).
-        feedback_low: Lower ends of K. Shape (m, n).
-        feedback_high: Upper ends of K. Shape (m, n).
-        start: Half gains b at θ̂ = 0 by row that is tracked; z_i(0) = Q_i(0) - b_t Q_t(0). Shape (n,).
-        noise: Bounds on the input errors that noise makes. Shape (m,).
-        drift: Bounds on |d m_k(x(t), r(t)) / dt|. Shape (m,).
-        feedforward: Bounds on |m_k|. Shape (m,).
-        states: Bounds on |x_i|. Shape (n,).
+
+def first_box(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], half_widths: Array) -> Box:
+    """A box with the demands that the networks have to meet, and next to nothing for the inputs.
+
+    Args:
+        model: Plant and law.
+        bounds: Assumptions.
+        gains: One for each controlled row.
+        half_widths: Bounds on |z_i|. Shape (n,).
+
+    Raises:
+        As `deviation_rows`.
     """
+    capacity = np.array([g.capacity for g in gains if g.gamma > 0])
+    box = Box(
+        half_widths=half_widths, input_bound=np.full(len(model.inputs), NOTHING), low=-capacity, high=capacity,
+        middle=np.zeros(len(capacity)), network_bound=np.full(len(capacity), NOTHING),
+    )  # fmt: skip
+    for _ in range(3 if len(capacity) else 0):
+        rows = deviation_rows(model, bounds, gains, box)
+        low, high = rows.demand.T
+        room = 1e-6 * np.maximum(np.abs(low), np.abs(high))
+        # what is left leans to a side until its middle is met too
+        box = replace(box, low=low - room, high=high + room, middle=rounded(box.middle + rows.lean))
+    low, high = deviation_rows(model, bounds, gains, box).demand.T
+    room = 1e-6 * np.maximum(np.abs(low), np.abs(high))
+    return replace(box, low=low - room, high=high + room)
 
-    low: Array
-    high: Array
-    input_low: Array
-    input_high: Array
-    disturbance: Array
-    mass_low: Array
-    mass_high: Array
-    feedback_low: Array
-    feedback_high: Array
-    start: Array
-    noise: Array
-    drift: Array
-    feedforward: Array
-    states: Array
+
+def rounded(values: Array) -> Array:
+    """Values with the digits that a file carries."""
+    return np.array([float(f"{v:.8e}") for v in values])
 
 
-def deviation_rows(
-    model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], half_widths: Array, input_bound: Array
-) -> DeviationRows:
-    """Enclose the plant over the box |z_i| <= half_widths_i, |v_k| <= input_bound_k.
+def deviation_rows(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], box: Box) -> DeviationRows:
+    """Enclose the plant over a box.
 
     Args:
         model: Plant and law.
         bounds: Assumptions.
         gains: One for each controlled row, in order.
-        half_widths: Half widths of the box, in the units of the states. Shape (n,).
-        input_bound: Half widths for v, in the units of the inputs. Shape (m,).
+        box: Where.
 
     Returns:
         The enclosures.
 
     Raises:
-        ZeroDivisionError: a divisor of the model can vanish in the box.
-        ValueError: the modelling term of a tracked row reads a state, so that no operating point follows from the
-            reference alone.
+        UnboundedError: a divisor of the model can vanish in the box, or numbers grow beyond floats; the modelling term
+            of a tracked row reads a state, so that no operating point follows from the reference alone; nothing drives
+            a row with a network.
 
-    Not guaranteed: that the box is invariant. The caller checks it.
+    Not guaranteed: that the box is invariant, or that `demand` is inside the box. The caller checks both.
     """
     tracked = {row.target for row in model.rows if isinstance(row.target, int)}
     states = {row.state for row in model.rows}
     for row, term in zip(model.controlled, model.law, strict=True):
         if row in tracked and states & set(term.inputs):
-            raise ValueError(f"the modelling term of row {row + 1} reads a state; a sampled certificate needs it free")
-    return _Builder(model, bounds, gains, half_widths, input_bound).deviations()
+            raise UnboundedError(f"the modelling term of row {row + 1} reads a state; a certificate needs it free")
+    try:
+        return _Builder(model, bounds, gains, box).deviations()
+    except (ZeroDivisionError, ValueError, OverflowError) as error:
+        raise UnboundedError(f"the model cannot be bounded over the box: {error}") from error
+
+
+@dataclass(frozen=True)
+class _Demand:
+    """What a network has to meet: range and rate of φ*, and the row's disturbance that is left."""
+
+    range: Interval
+    rate: float
+    rest: float
+    lean: float
+    resting: Interval
 
 
 class _Builder(Builder):
-    """Rows without the proportional parts: the symbols Q are the deviations z, e the held inputs v."""
+    """Rows without the proportional parts: the symbols Q are the deviations z, e the inputs v, p the demands φ*."""
+
+    def __init__(self, model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], box: Box) -> None:
+        self.box, self.networks = box, networks(model, gains)
+        super().__init__(model, bounds, gains, box.half_widths, box.input_bound)
+        for k, i in enumerate(self.networks):
+            self.symbols.ranges[f"p{i}"] = Interval(float(box.low[k]), float(box.high[k]))
 
     def _error(self, i: int) -> float:
         target = self.model.rows[i].target
-        upstream = self.half_gain[target].high * self._error(target) if isinstance(target, int) else 0.0
+        if isinstance(target, str):
+            return self.half_widths[i]
+        upstream = self.half_gain[target].high * self._error(target)
+        if target in self.networks:
+            upstream += float(self.box.network_bound[self.networks.index(target)])
         return (self.half_widths[i] + upstream) * (1 + 1e-12)
 
     def _control(self, row: int) -> Form:
-        return self.model_term[row]
+        return self.model_term[row] - Form.of(f"p{row}") if row in self.networks else self.model_term[row]
 
     def _virtual_rate(self, i: int, error_rate: Form) -> Form:
         return Form()
@@ -113,41 +140,87 @@ class _Builder(Builder):
         self._states()
         values = self._plant()
         masses = [values[i].range for i in range(n)]
-        forces = [self.symbols.expand(values[n + i].form) for i in range(n)]
+        raw = [values[n + i].form for i in range(n)]
+        forces = [self.symbols.expand(form) for form in raw]
         rows, term_rates = self._rows(
             forces, masses, [f.scaled(ONE / mass) for f, mass in zip(forces, masses, strict=True)]
         )
-        feedback = [self._feedback(row) for row in self.model.input_map]
+        demands = {i: self._demand(i, raw[i], rows[i], masses[i], term_rates) for i in self.networks}
+        left = [demands[i].rest if i in demands else self._disturbance(row, "Qe") for i, row in enumerate(rows)]
+        halves = [self.half_gain[i] * ROUNDED for i in self.model.controlled]
+        inputs = self.model.input_map
         return DeviationRows(
             low=np.array([[row.coefficient(f"Q{j}").low for j in range(n)] for row in rows]),
             high=np.array([[row.coefficient(f"Q{j}").high for j in range(n)] for row in rows]),
             input_low=np.array([[row.coefficient(f"e{k}").low for k in range(m)] for row in rows]),
             input_high=np.array([[row.coefficient(f"e{k}").high for k in range(m)] for row in rows]),
-            disturbance=np.array([self._disturbance(row, "Qe") for row in rows]),
+            disturbance=np.array(left),
             mass_low=np.array([mass.low for mass in masses]),
             mass_high=np.array([mass.high for mass in masses]),
-            feedback_low=np.array([[c.low for c in row] for row in feedback]),
-            feedback_high=np.array([[c.high for c in row] for row in feedback]),
-            start=np.array([self._start(i) for i in range(n)]),
-            noise=np.array([self._control_noise(row) for row in self.model.input_map]),
+            half_low=np.array([half.low for half in halves]),
+            half_high=np.array([half.high for half in halves]),
+            noise=np.array([self._term_noise(row) for row in inputs]),
             drift=np.array([
-                self.symbols.range_of(self.symbols.expand(term_rates[row])).magnitude for row in self.model.input_map
+                self.symbols.range_of(self.symbols.expand(term_rates[row])).magnitude for row in inputs
             ]),
-            feedforward=np.array([self.symbols.range_of(self._control(row)).magnitude for row in self.model.input_map]),
-            states=np.array([self.inputs[row.state].range.magnitude for row in self.model.rows]),
+            signals=(*(self._target(i) for i in range(n)), *(self._control(row) for row in inputs)),
+            ranges=(dict(self.symbols.ranges), self._resting() | {f"p{i}": d.resting for i, d in demands.items()}),
+            demand=np.array([[d.range.low, d.range.high] for d in demands.values()]).reshape(-1, 2),
+            demand_rate=np.array([d.rate for d in demands.values()]),
+            settled=np.array([d.rest / self._drive(i, raw[i], rows[i])[0].low for i, d in demands.items()]),
+            lean=np.array([d.lean for d in demands.values()]),
         )  # fmt: skip
 
-    def _feedback(self, row: int) -> list[Interval]:
-        """K for one input: b_i Q_i with Q_i = z_i + b_t Q_t."""
-        factor, column = self.half_gain[row] * ROUNDED, [Interval(0.0)] * len(self.model.rows)
-        column[row] = factor
-        target = self.model.rows[row].target
-        while isinstance(target, int):
-            factor = factor * self.half_gain[target] * ROUNDED
-            column[target] = factor
-            target = self.model.rows[target].target
-        return column
+    def _demand(self, i: int, raw: Form, row: Form, mass: Interval, term_rates: dict[int, Form]) -> _Demand:
+        """Split row i into what φ*_i meets and what is left.
 
-    def _start(self, i: int) -> float:
-        target = self.model.rows[i].target
-        return 0.5 * self.gains[target].beta if isinstance(target, int) else 0.0
+        Only constant coefficients count: those of the force before nonlinear operations are replaced by what bounds
+        them, and those of the target's rate that are numbers.
+        """
+        rates, target = self._rates_of_signals(), self.model.rows[i].target
+        moving = term_rates[target] if isinstance(target, int) else Form.of("r1") if target == "reference" else Form()
+        shift = {s: c for s, c in moving.coefficients.items() if c.is_point and s in rates}
+        own = {s: c for s, c in raw.coefficients.items() if s in rates}
+        met = Form(own) - Form(shift).scaled(mass)
+        drive, constant = self._drive(i, raw, row)
+        known = {*own, f"p{i}"} if constant else {*own}
+        rest = self.symbols.expand(Form({s: c for s, c in raw.coefficients.items() if s not in known}, raw.constant))
+        late = Form({s: c for s, c in moving.coefficients.items() if s not in shift}, moving.constant)
+        middle = Form(constant=Interval(float(self.box.middle[self.networks.index(i)])))
+        level = self.symbols.range_of(met + middle)
+        change = total(c * rates[s] for s, c in met.coefficients.items()).magnitude
+        rest = rest - late.scaled(mass) - middle
+        if not constant:  # where the effect of φ̂ may change, φ* is for its middle
+            centre, around = (drive.high + drive.low) / 2, (drive.high - drive.low) / 2 * (1 + 1e-12)
+            drive = Interval(centre)
+            rest = Form({s: c for s, c in rest.coefficients.items() if s != f"p{i}"}, rest.constant)
+            rest = rest + Form(constant=Interval.symmetric(around * (level / drive).magnitude))
+        kept = {s: c for s, c in rest.coefficients.items() if s[0] not in "Qe"}
+        left = self.symbols.range_of(Form(kept, rest.constant))
+        still = over(met + middle, {**self.symbols.ranges, **self._resting()})
+        return _Demand(
+            level / drive, change / drive.low * (1 + 1e-12), left.magnitude, (left.low + left.high) / 2, still / drive
+        )
+
+    def _resting(self) -> dict[str, Interval]:
+        """The reference while it rests at first."""
+        return {f"r{k}": Interval(self.bounds.rest[0] if k == 0 else 0.0) for k in range(4)}
+
+    def _drive(self, i: int, raw: Form, row: Form) -> tuple[Interval, bool]:
+        """The effect of φ̂_i on its row, and whether it is constant.
+
+        Raises:
+            ValueError: nothing that keeps its sign drives the row.
+        """
+        direct = -raw.coefficient(f"p{i}")
+        found = direct if direct.low > 0 else -row.coefficient(f"p{i}")
+        if not found.low > 0:
+            raise ValueError(f"the load network of row {i + 1} has no effect of a known sign")
+        return found, direct.low > 0
+
+    def _rates_of_signals(self) -> dict[str, Interval]:
+        """Rate of each signal whose rate is bounded."""
+        ranges = self.bounds.reference
+        return {f"r{k}": ranges[k + 1] for k in range(3)} | {
+            f"w:{name}": rate for name, (_, rate) in self.bounds.feedforward.items()
+        }

@@ -72,12 +72,18 @@ class Gains:
         epsilon: Adaptation gain ε ≥ 0; 0 switches the adaptation off.
         delta: Adaptation rate δ > 0.
         sigma: Leakage σ > 0.
+        gamma: Gain γ ≥ 0 of the load network φ̂; 0 switches it off.
+        capacity: Φ, what |φ̂| is kept below; above 0 where γ is.
+        preload: φ̂ at the start.
     """
 
     beta: float
     epsilon: float = 0.0
     delta: float = 1.0
     sigma: float = 1.0
+    gamma: float = 0.0
+    capacity: float = 0.0
+    preload: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,8 +99,11 @@ class Bounds:
         initial: Bound on each |Q_i(0)|. Shape (n,).
         period: Control period in s; 0 for a continuous law.
         transient: Time from which on the bound on the tracking error must hold, s.
-        feedforward: Disturbances that the law foresees as they move, ``nominal.NAME``: range, and range of the rate.
-            `disturbances` then holds what the real one may differ from the foreseen one.
+        feedforward: Disturbances whose rate is bounded: range, and range of the rate. `disturbances` then holds what
+            the real one may differ from that, of any course. The law foresees them as they move, ``nominal.NAME``,
+            unless `nominal` has the name.
+        delay: Computing delay in s: what is measured at t_k acts from t_k + delay on.
+        rest: Where the reference rests at first, and for how long, s.
     """
 
     parameters: Mapping[str, Interval]
@@ -106,3 +115,5 @@ class Bounds:
     period: float
     transient: float = 0.0
     feedforward: Mapping[str, tuple[Interval, Interval]] = field(default_factory=dict)
+    delay: float = 0.0
+    rest: tuple[float, float] = (0.0, 0.0)

@@ -17,6 +17,9 @@ from .model import Bounds, Gains, LoopModel
 
 Array = NDArray[np.float64]
 
+#: A parameter that may change in a run: faults take effectiveness.
+VARYING = "effectiveness"
+
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorRows:
@@ -94,13 +97,17 @@ class Builder:
         self.inputs: dict[str, Value] = {}
         for name, number in bounds.nominal.items():
             self.inputs[f"nominal.{name}"] = self.symbols.constant(Interval(number), name)
-        for name, interval in {**bounds.parameters, **bounds.disturbances}.items():
-            self.inputs[name] = self.symbols.constant(interval, name)
+        for name, interval in bounds.parameters.items():
+            self.inputs[name] = self._changing(name, interval) if name == VARYING else self._fixed(name, interval)
+        for name, interval in bounds.disturbances.items():
+            if name not in bounds.feedforward:
+                self.inputs[name] = self._changing(name, interval)
         for name, (value, _) in bounds.feedforward.items():
             symbol = f"w:{name}"
             self.symbols.ranges[symbol] = value
-            self.inputs[f"nominal.{name}"] = self.symbols.value(f"nominal.{name}", Form.of(symbol))
-            beside = Form.of(symbol) + Form(constant=bounds.disturbances[name])
+            if name not in bounds.nominal:
+                self.inputs[f"nominal.{name}"] = self.symbols.value(f"nominal.{name}", Form.of(symbol))
+            beside = Form.of(symbol) + self._changing(name, bounds.disturbances[name]).form
             self.inputs[name] = self.symbols.value(name, beside)
         for k in range(4):
             self.inputs[f"r{k}"] = self.symbols.value(f"r{k}", Form.of(f"r{k}"))
@@ -109,6 +116,16 @@ class Builder:
         self.theta_rate: dict[int, float] = {}
         self.half_gain: dict[int, Interval] = {}
         self.model_term: dict[int, Form] = {}
+
+    def _fixed(self, name: str, interval: Interval) -> Value:
+        return self.symbols.constant(interval, name)
+
+    def _changing(self, name: str, interval: Interval) -> Value:
+        """What may change at any time: a symbol, so that the coefficients of others stay constant."""
+        if interval.is_point:
+            return self._fixed(name, interval)
+        self.symbols.ranges[f"d:{name}"] = interval
+        return self.symbols.value(name, Form.of(f"d:{name}"))
 
     def build(self) -> ErrorRows:
         """The enclosures."""

@@ -18,10 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certificates.certificate import Certificate, Failure
-from ..certificates.sampled import Sampled, certify_sampled, speeds
+from ..certificates.certificate import Failure
+from ..certificates.impulse import Impulse, Search, begun, certify_impulse
 from ..enclosures.interval import Interval
-from ..loops.deviation import deviation_rows
 from ..loops.model import Bounds, Gains, LoopModel
 from .coupling import Tube
 
@@ -67,7 +66,7 @@ class Contract:
     guarantee: Tube | None
     reached: Tube | None
     bounds: Bounds
-    certificate: Certificate
+    certificate: Impulse
 
 
 #: From the guarantees to the assumptions that each member is proved under.
@@ -88,10 +87,13 @@ def solve_contracts(subsystems: Mapping[str, Subsystem], assume: Assume) -> dict
     nothing = Tube(position=0.0, speed=0.0, acceleration=0.0)
     assumed = dict(assume(dict.fromkeys(subsystems, nothing)))
     gap: Array | None = None
+    searches: dict[str, Search | Failure] = {}
     for turn in range(ROUNDS):
         made: dict[str, Contract] = {}
         for name, own in subsystems.items():
-            found = prove(name, own, assumed[name])
+            if name not in searches:
+                searches[name] = begun(own.model, assumed[name], own.gains, own.limit)
+            found = _proved(name, own, assumed[name], searches[name])
             if isinstance(found, Failure):
                 return replace(found, together=turn > 0)
             made[name] = found
@@ -147,20 +149,28 @@ def replaced(
 
 def prove(name: str, own: Subsystem, bounds: Bounds, *, refine: bool = False) -> Contract | Failure:
     """One member under given assumptions, with the tube that it can guarantee."""
-    found = certify_sampled(own.model, bounds, own.gains, own.limit, refine=refine)
+    search = certify_impulse(own.model, bounds, own.gains, own.limit, refine=refine)
+    return _contract(name, own, bounds, search)
+
+
+def _proved(name: str, own: Subsystem, bounds: Bounds, search: Search | Failure) -> Contract | Failure:
+    return _contract(name, own, bounds, search if isinstance(search, Failure) else search.run(bounds))
+
+
+def _contract(name: str, own: Subsystem, bounds: Bounds, found: Impulse | Failure) -> Contract | Failure:
     if isinstance(found, Failure):
         return replace(found, reason=f"{name}: {found.reason}")
-    reached = tube_of(own, bounds, found)
+    reached = tube_of(own, found)
     return Contract(guarantee=reached.scaled(ROOM), reached=reached, bounds=bounds, certificate=found)
 
 
-def tube_of(own: Subsystem, bounds: Bounds, found: Sampled) -> Tube:
-    """The deviations that a sampled certificate bounds for all t."""
-    rows = deviation_rows(own.model, bounds, own.gains, found.half_widths, found.input_bound)
-    rates = speeds(rows, found, bounds.period)
+def tube_of(own: Subsystem, found: Impulse) -> Tube:
+    """The deviations that a certificate bounds for all t."""
     if own.first == "speed":
-        return Tube(position=0.0, speed=float(found.half_widths[0]), acceleration=float(rates[0]))
-    return Tube(position=float(found.half_widths[0]), speed=float(found.half_widths[1]), acceleration=float(rates[1]))
+        return Tube(position=0.0, speed=float(found.half_widths[0]), acceleration=float(found.rates[0]))
+    return Tube(
+        position=float(found.half_widths[0]), speed=float(found.half_widths[1]), acceleration=float(found.rates[1])
+    )
 
 
 def refined(name: str, own: Subsystem, contract: Contract) -> Contract:

@@ -90,17 +90,18 @@ def test_every_parameter_says_what_it_is(level):
         assert 0 <= parameter.tolerance < 1
 
 
-def hand_written(x, r, theta, gains, period, limit):
-    """An independent RAC of two subsystems without modelling terms."""
+def hand_written(x, r, theta, phi, gains, period, limit):
+    """An independent RAC of two subsystems without modelling terms: input, θ̂ and φ̂ afterwards."""
     q1 = x[0] - r[0]
-    k1 = -0.5 * (gains[0][0] + gains[0][1] * theta[0]) * q1 + r[1]
+    k1 = -0.5 * (gains[0][0] + gains[0][1] * theta[0]) * q1 + r[1] - phi[0]
     q2 = x[1] - k1
-    u = -0.5 * (gains[1][0] + gains[1][1] * theta[1]) * q2
-    after = [
-        t + period * (-g[2] * g[3] * t + 0.5 * g[1] * g[2] * q * q)
-        for t, g, q in zip(theta, gains, (q1, q2), strict=True)
-    ]
-    return max(-limit, min(limit, u)), after
+    asked = -0.5 * (gains[1][0] + gains[1][1] * theta[1]) * q2 - phi[1]
+    adapted, learned = [], []
+    for t, p, g, q in zip(theta, phi, gains, (q1, q2), strict=True):
+        adapted.append(t + period * (-g[2] * g[3] * t + 0.5 * g[1] * g[2] * q * q))
+        held = abs(asked) > limit and -q * asked > 0  # more of φ̂ would push the input further out
+        learned.append(max(-g[5], min(g[5], p if held else p + period * g[4] * q)))
+    return max(-limit, min(limit, asked)), adapted, learned
 
 
 positive = st.floats(0.01, 100)
@@ -111,26 +112,42 @@ positive = st.floats(0.01, 100)
     st.lists(st.floats(-0.1, 0.1), min_size=3, max_size=3),
     st.lists(st.floats(-0.1, 0.1), min_size=4, max_size=4),
     st.lists(st.floats(0, 5), min_size=2, max_size=2),
-    st.lists(st.lists(positive, min_size=4, max_size=4), min_size=2, max_size=2),
+    st.lists(st.floats(-60, 60), min_size=2, max_size=2),
+    st.lists(st.lists(positive, min_size=7, max_size=7), min_size=2, max_size=2),
 )
-def test_the_step_is_the_law(x, r, theta, gains):
+def test_the_step_is_the_law(x, r, theta, phi, gains):
     law = RAC(plant=build("torque"))
     step = step_function(law, 1e-4)
     nominal = list(law.plant.values().values())
-    u, after, _ = step(x, r, theta, np.array(gains).ravel(), nominal, 0.0)
-    expected, adapted = hand_written(x, r, theta, gains, 1e-4, 77.0)
+    u, after, _ = step(x, r, [*theta, *phi], np.array(gains).ravel(), nominal, 0.0)
+    expected, adapted, learned = hand_written(x, r, theta, phi, gains, 1e-4, 77.0)
     assert float(u) == pytest.approx(expected, rel=1e-12, abs=1e-12)
-    assert np.array(after).ravel() == pytest.approx(adapted, rel=1e-12, abs=1e-15)
+    assert np.array(after).ravel() == pytest.approx([*adapted, *learned], rel=1e-12, abs=1e-15)
     if all(1e-4 * g[2] * g[3] <= 1 for g in gains):
-        assert (np.array(after) >= 0).all()
+        assert (np.array(after)[:2] >= 0).all()
+
+
+def test_without_its_gain_a_network_changes_no_bit():
+    law = RAC(plant=build("torque"))
+    step, nominal = step_function(law, 1e-4), list(law.plant.values().values())
+    random = np.random.default_rng(3)
+    for _ in range(20):
+        x, r, theta = random.normal(size=3), random.normal(size=4), random.uniform(size=2)
+        gains = random.uniform(0.1, 100, (2, 7))
+        gains[:, 4:] = 0.0
+        u, after, _ = step(x, r, [*theta, 0.0, 0.0], gains.ravel(), nominal, 0.0)
+        q1 = x[0] - r[0]
+        q2 = x[1] - (-(gains[0, 0] + gains[0, 1] * theta[0]) * q1 / 2 + r[1])
+        asked = -(gains[1, 0] + gains[1, 1] * theta[1]) * q2 / 2
+        assert float(u) == asked * (77.0 / max(abs(asked), 77.0)) and (np.array(after)[2:] == 0).all()
 
 
 def test_the_amplitude_limit_scales_the_vector():
     law = RAC(plant=build("voltage"))
     step = step_function(law, 1e-4)
-    gains = np.array([[30, 0, 1, 1], [6000, 0, 1, 1], [90, 0, 1, 1], [90, 0, 1, 1]], dtype=float)
+    gains = np.array([[b, 0, 1, 1, 0, 0, 0] for b in (30, 6000, 90, 90)], dtype=float)
     x = [0.21, 0.0, 10.0, 30.0]
-    u = np.array(step(x, [0.2, 0, 0, 0], [0] * 4, gains.ravel(), list(law.plant.values().values()), 0.0)[0]).ravel()
+    u = np.array(step(x, [0.2, 0, 0, 0], [0] * 8, gains.ravel(), list(law.plant.values().values()), 0.0)[0]).ravel()
     assert np.linalg.norm(u) == pytest.approx(law.plant.limits[0].value) and u[0] * u[1] != 0
 
 
@@ -186,8 +203,11 @@ def test_one_law_for_any_number_of_subsystems(order):
     law = RAC(plant=chain_plant(order))
     random = np.random.default_rng(order)
     x, r, theta = random.normal(size=order), random.normal(size=4), random.uniform(size=order)
-    gains = random.uniform(0.5, 2.0, (order, 4))
-    u, after, errors = (np.array(v).ravel() for v in step_function(law, 1e-3)(x, r, theta, gains.ravel(), [1.0], [0.0]))
+    phi, gains = random.normal(size=order), random.uniform(0.5, 2.0, (order, 7))
+    step = step_function(law, 1e-3)
+    u, after, errors = (
+        np.array(v).ravel() for v in step(x, r, [*theta, *phi], gains.ravel(), [1.0], [0.0])
+    )  # fmt: skip
     goal = r[0]
     for i in range(order):
         q = x[i] - goal
@@ -195,6 +215,8 @@ def test_one_law_for_any_number_of_subsystems(order):
         assert after[i] == pytest.approx(
             theta[i] + 1e-3 * (0.5 * gains[i, 1] * gains[i, 2] * q * q - gains[i, 2] * gains[i, 3] * theta[i])
         )
-        goal = -0.5 * (gains[i, 0] + gains[i, 1] * theta[i]) * q + (r[1] if i == 0 and order > 1 else 0.0)
+        learned = np.clip(phi[i] + 1e-3 * gains[i, 4] * q, -gains[i, 5], gains[i, 5])
+        assert after[order + i] == pytest.approx(learned)
+        goal = -0.5 * (gains[i, 0] + gains[i, 1] * theta[i]) * q + (r[1] if i == 0 and order > 1 else 0.0) - phi[i]
     assert u[0] == pytest.approx(goal + (r[1] if order == 1 else 0.0))
     assert len(law.loop_model().rows) == order

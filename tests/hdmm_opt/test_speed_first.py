@@ -57,7 +57,8 @@ def test_its_loop_is_that_of_an_independent_integration():
     problem = assemble(study())
     beta, epsilon, delta, sigma = (400.0, 20.0, 1.0, 5.0)
     trace = Loop(problem).trace(
-        {"actuator": (beta, epsilon, delta, sigma)}, Scenario(name="s", disturbances={"drag": ((0.0, 8.0),)})
+        {"actuator": (beta, epsilon, delta, sigma, 0.0, 0.0, 0.0)},
+        Scenario(name="s", disturbances={"drag": ((0.0, 8.0),)}),
     )
     own, (member,) = trace.members["actuator"], problem.members
     v, theta = member.reference(0.0)[0, 0], 0.0

@@ -40,10 +40,15 @@ def wide(document, split):
     names = [*plant.states]
     gains = {}
     for k in range(ROWS):
-        gains |= {f"beta_{k + 1}": 20.0, f"epsilon_{k + 1}": 1.0, f"delta_{k + 1}": 1.0, f"sigma_{k + 1}": 1.0}
+        gains |= {f"beta_{k + 1}": 20.0, f"epsilon_{k + 1}": 1.0, f"delta_{k + 1}": 1.0, f"sigma_{k + 1}": 1.0,
+                  f"gamma_{k + 1}": 1.0, f"phi_{k + 1}": 100.0, f"preload_{k + 1}": 0.0}  # fmt: skip
     long = "{}/1000000000000000000000000000"
-    rows = [[long.format(10**27 * (i == j) + 123456789012345678901234567 * (i + 2 * j + 1) % 10**25)
-             for j in range(ROWS)] for i in range(ROWS)]  # fmt: skip
+    order = 24
+
+    def rows(size, width):
+        return [[long.format(10**27 * (i == j) + 123456789012345678901234567 * (i + 2 * j + 1) % 10**25)
+                 for j in range(width)] for i in range(size)]  # fmt: skip
+
     cells = 1
     for count in split:
         cells *= count
@@ -77,13 +82,23 @@ def wide(document, split):
         *({"name": f"{kind}.{name}", "lower": -1e-6, "upper": 1e-6, "unit": units[name], "source": "study"}
           for kind in ("noise", "initial") for name in names),
     ]  # fmt: skip
+    study["controller"]["delay_s"] = 1 / study["controller"]["rate_hz"]
+    study["uncertainty"]["disturbances"]["load_force"].pop("rate", None)
     entry["certificate"] = {
-        "kind": "sampled", "decay": "1/10", "half_widths": vector, "input_bound": vector,
-        "envelope": {"rate": "1/20", "ultimate": vector}, "split": split,
-        "cells": [{"transform": rows, "reach": vector, "start": vector, "shape": vector}] * cells,
+        "kind": "impulse", "half_widths": vector, "input_bound": vector,
+        "networks": [{"row": name, "low": "-1", "high": "1", "middle": "0", "bound": "1"} for name in names],
+        "force": rows(ROWS, ROWS), "drive": rows(ROWS, ROWS), "split": split,
+        "cells": [{"columns": rows(order, order), "blocks": [2] * (order // 2), "groups": [1] * 300 + [1000] * 100,
+                   "growth": "100001/100000"}] * cells,
+        "envelope": {"rate": "1/20", "ultimate": vector},
     }  # fmt: skip
     entry["golden"] = [
-        {"x": [float(k)] * ROWS, "r": [0.0] * 4, "theta": [0.0] * ROWS, "u": [0.0] * ROWS, "theta_next": [0.0] * ROWS}
+        {
+            "x": [float(k)] * ROWS,
+            "r": [0.0] * 4,
+            "u": [0.0] * ROWS,
+            **dict.fromkeys(("theta", "phi", "theta_next", "phi_next"), [0.0] * ROWS),
+        }
         for k in range(20)
     ]
     return to_text(seal(document))

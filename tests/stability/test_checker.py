@@ -4,19 +4,17 @@ import json
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from known_answers import claim_of, verdict
 
-from stability import Bounds, Composition, Gains, Interval, LoopModel, Row, certify, checker, from_casadi
+from stability import checker
+from stability.certificates.definite import positive_definite
 
 
 def status(text):
@@ -39,7 +37,7 @@ def test_the_committed_file_is_proved_by_the_checker_alone(tmp_path, gain_text):
     assert alone("bad.json").returncode == 2
     assert alone("missing.json").returncode == 2
     rows = json.loads(alone("good.json", "--json").stdout)
-    assert sorted(o["name"] for o in rows[0]["obligations"]) == sorted(checker.REQUIRED["rac"]["sampled"])
+    assert sorted(o["name"] for o in rows[0]["obligations"]) == sorted(checker.REQUIRED["rac"]["impulse"])
 
 
 def walk(node, path=()):
@@ -119,16 +117,84 @@ def rational(key, factor, index=None):
     return change
 
 
-def in_cell(key, factor, *path):
-    """Scale a number of the first cell of a sampled certificate."""
+def scaled(*path, factor):
+    """Scale a number of the certificate."""
 
     def change(data):
-        holder = own(data)["certificate"]["cells"][0][key]
-        for index in path[:-1]:
-            holder = holder[index]
-        holder[path[-1]] = str(Fraction(holder[path[-1]]) * factor)
+        holder = own(data)["certificate"]
+        for key in path[:-1]:
+            holder = holder[key]
+        value = holder[path[-1]]
+        holder[path[-1]] = str(Fraction(value) * factor) if isinstance(value, str) else value * factor
 
     return change
+
+
+def moved(*path, by):
+    """Add to a number of the certificate."""
+
+    def change(data):
+        holder = own(data)["certificate"]
+        for key in path[:-1]:
+            holder = holder[key]
+        holder[path[-1]] = str(Fraction(holder[path[-1]]) + Fraction(by))
+
+    return change
+
+
+def every_cell(change):
+    """The same change of every cell."""
+
+    def whole(data):
+        for cell in own(data)["certificate"]["cells"]:
+            change(cell)
+
+    return whole
+
+
+def without_last(part):
+    def change(cell):
+        cell["groups"] = cell["groups"][:part]
+
+    return change
+
+
+def merged(cell):
+    """Blocks of one, whatever the poles are."""
+    cell["blocks"] = [1] * len(cell["columns"])
+    cell["columns"] = [row[1:] + row[:1] for row in cell["columns"]]
+
+
+def coupled_columns(cell):
+    """A combination of all coordinates in place of the first."""
+    cell["columns"] = [[str(sum(map(Fraction, row), Fraction(0))), *row[1:]] for row in cell["columns"]]
+    cell["columns"] = [[str(Fraction(row[0]) + 3 * Fraction(row[-1])), *row[1:]] for row in cell["columns"]]
+
+
+def one_load_rate(factor):
+    """A load that changes faster, in the study and in the assumptions."""
+
+    def change(data):
+        data["study"]["uncertainty"]["disturbances"]["load_force"]["rate"] *= factor
+        entry = next(a for a in own(data)["assumptions"] if a["name"] == "feedforward_rate.load_force")
+        entry["lower"], entry["upper"] = entry["lower"] * factor, entry["upper"] * factor
+
+    return change
+
+
+def in_study_and_gain(name, value):
+    """Another value of a fixed gain, everywhere."""
+
+    def change(data):
+        data["study"]["controller"]["members"]["actuator"][name] = {"value": value}
+        entry = next(g for g in own(data)["gains"] if g["name"] == name)
+        entry["value"] = entry["min"] = entry["max"] = value
+
+    return change
+
+
+def delay(value):
+    return lambda data: data["study"]["controller"].update(delay_s=value)
 
 
 def operation(where, old, new):
@@ -186,7 +252,7 @@ def both(name, factor):
 def load(low, high):
     def change(data):
         data["study"]["uncertainty"]["disturbances"]["load_force"]["range"] = [low, high]
-        entry = next(a for a in own(data)["assumptions"] if a["name"] == "disturbance.load_force")
+        entry = next(a for a in own(data)["assumptions"] if a["name"] == "feedforward.load_force")
         entry["lower"], entry["upper"] = low, high
 
     return change
@@ -292,40 +358,99 @@ MUTATIONS = {
     "more friction": both("coulomb_friction", 1.9),
     "more screw friction": both("screw_friction", 1.4),
     "assumption narrower than the study": assumption("parameter.motor_inertia", 1.05, 0.95),
-    "load narrower than the study": assumption("disturbance.load_force", 1.02, 0.98),
+    "load narrower than the study": assumption("feedforward.load_force", 1.02, 0.98),
     "heavier load": load(65e3, 80e3),
     "load from the other side": load(-76e3, 76e3),
     "slower rate": rate(0.8),
     "a rate of its own": in_study("controller", "rates_hz", value={"actuator": 500.0}),
-    "faster decay": rational("decay", Fraction(11, 10)),
-    "no decay": rational("decay", Fraction(0)),
-    "smaller box": rational("half_widths", Fraction(9, 10), 0),
-    "smaller inner box": rational("half_widths", Fraction(95, 100), 1),
     "negative box": rational("half_widths", Fraction(-1), 1),
-    "smaller held error": rational("input_bound", Fraction(9, 10), 0),
     "negative held error": rational("input_bound", Fraction(-1), 0),
-    "smaller reach": in_cell("reach", Fraction(99, 100), 0),
-    "smaller inner reach": in_cell("reach", Fraction(99, 100), 1),
-    "negative reach": in_cell("reach", Fraction(-1), 2),
-    "start inside the reach": in_cell("start", Fraction(1, 2), 1),
-    "start too small": in_cell("start", Fraction(99, 100), 2),
-    "shape too small": in_cell("shape", Fraction(1, 2), 1),
-    "shape of zero": in_cell("shape", Fraction(0), 0),
-    "negative shape": in_cell("shape", Fraction(-1), 0),
-    "other coordinates": in_cell("transform", Fraction(11, 10), 1, 1),
-    "coordinates of another sign": in_cell("transform", Fraction(-1), 1, 0),
-    "singular coordinates": set_at("certificate", "cells", 0, "transform", 1, value=["0", "0", "0"]),
-    "tracking error left out of the coordinates": set_at("certificate", "cells", 0, "transform", 0, value=["0", "1", "0"]),
-    "huge coordinates": in_cell("transform", Fraction(10) ** 60, 2, 1),
+    **{f"smaller box of state {i}": rational("half_widths", Fraction(9, 10), i) for i in range(3)},
+    **{f"hardly smaller box of state {i}": rational("half_widths", Fraction(99, 100), i) for i in range(3)},
+    "smaller bound on the input": rational("input_bound", Fraction(9, 10), 0),
+    "hardly smaller bound on the input": rational("input_bound", Fraction(99, 100), 0),
+    "a box that hardly moves": rational("half_widths", Fraction(1, 10**40), 2),
+    "smaller bound on the network": scaled("networks", 0, "bound", factor=Fraction(9, 10)),
+    "no bound on the network": scaled("networks", 0, "bound", factor=Fraction(0)),
+    "a demand cut from below": moved("networks", 0, "low", by="1"),
+    "a demand cut from above": moved("networks", 0, "high", by="-1"),
+    "a demand upside down": lambda data: own(data)["certificate"]["networks"][0].update(low="0", high="-30"),
+    "another middle of the demand": moved("networks", 0, "middle", by="3"),
+    "a middle far away": moved("networks", 0, "middle", by="-30"),
+    "no network": set_at("certificate", "networks", value=[]),
+    "a network twice": lambda data: own(data)["certificate"]["networks"].append(own(data)["certificate"]["networks"][0]),
+    "a network of another row": set_at("certificate", "networks", 0, "row", value="position"),
+    **{f"another force at {i}, {j}": scaled("force", i, j, factor=Fraction(13, 10))
+       for i, j in ((0, 1), (1, 2), (2, 2))},
+    "a force that is not there": moved("force", 1, 0, by="1000"),
+    "a force of another sign": scaled("force", 1, 2, factor=Fraction(-1)),
+    "a stronger input": scaled("drive", 2, 0, factor=Fraction(13, 10)),
+    "no input": scaled("drive", 2, 0, factor=Fraction(0)),
+    "an input of a row that has none": moved("drive", 1, 0, by="10"),
+    "forces of two rows": lambda data: own(data)["certificate"]["force"].pop(),
+    "half of the periods": every_cell(without_last(15)),
+    "one period": every_cell(without_last(1)),
+    "periods of nothing": every_cell(lambda cell: cell.update(groups=[0])),
+    "no periods": every_cell(lambda cell: cell.update(groups=[])),
+    "one large group of periods": every_cell(lambda cell: cell.update(groups=[sum(cell["groups"])])),
+    "a group of a million periods": every_cell(lambda cell: cell["groups"].append(1_000_000)),
+    "five hundred groups": every_cell(lambda cell: cell.update(groups=[1] * 500)),
+    "a growth of two": every_cell(lambda cell: cell.update(growth="2")),
+    "a faster decay": every_cell(lambda cell: cell.update(growth="11/10")),
+    "a decay backwards": every_cell(lambda cell: cell.update(growth="9/10")),
+    "no decay": every_cell(lambda cell: cell.update(growth="1")),
+    "a negative growth": every_cell(lambda cell: cell.update(growth="-2")),
+    "other blocks": every_cell(merged),
+    "a block less": every_cell(lambda cell: cell["blocks"].pop()),
+    "a block of three": every_cell(lambda cell: cell.update(blocks=[3, 1, 1])),
+    "a block of nothing": every_cell(lambda cell: cell["blocks"].append(0)),
+    "mixed coordinates": every_cell(coupled_columns),
+    "coordinates in place of their inverse": every_cell(
+        lambda cell: cell.update(columns=[list(row) for row in zip(*cell["columns"], strict=True)])
+    ),
+    "singular coordinates": every_cell(lambda cell: cell["columns"].__setitem__(1, ["0"] * len(cell["columns"]))),
+    "a coordinate less": every_cell(lambda cell: cell["columns"].pop()),
+    "coordinates of one state": every_cell(lambda cell: cell.update(columns=[["1"]], blocks=[1])),
+    "huge coordinates": every_cell(lambda cell: cell["columns"][2].__setitem__(1, "1e60")),
+    "coordinates of many digits": every_cell(
+        lambda cell: cell["columns"][1].__setitem__(1, "1" * 100 + "/" + "3" * 100)
+    ),
     "fewer cells": lambda data: own(data)["certificate"]["cells"].pop(),
-    "cells in another order": lambda data: own(data)["certificate"]["cells"].reverse(),
     "no cells": set_at("certificate", "cells", value=[]),
     "no split": set_at("certificate", "split", value=[]),
     "split into nothing": set_at("certificate", "split", value=[0, 0, 0]),
-    "sixty-four cells": lambda data: own(data)["certificate"].update(split=[1, 8, 8], cells=own(data)["certificate"]["cells"][:1] * 64),
-    "coordinates of many digits": set_at("certificate", "cells", 0, "transform", 1, 1, value="1" * 100 + "/" + "3" * 100),
-    "another split": set_at("certificate", "split", value=[2, 2, 1]),
-    "a box that hardly moves": rational("half_widths", Fraction(1, 10**40), 2),
+    "one cell for all": lambda data: own(data)["certificate"].update(
+        split=[1, 1, 1], cells=own(data)["certificate"]["cells"][:1]
+    ),
+    "sixty-five cells": lambda data: own(data)["certificate"].update(
+        split=[1, 5, 13], cells=own(data)["certificate"]["cells"][:1] * 65
+    ),
+    "another split": lambda data: own(data)["certificate"].update(split=[1, 1, len(own(data)["certificate"]["cells"])]),
+    "a load that changes faster": one_load_rate(3.0),
+    "a load that changes at any rate": lambda data: data["study"]["uncertainty"]["disturbances"]["load_force"].pop("rate"),
+    "a rate narrower than the study's": assumption("feedforward_rate.load_force", 0.5, 0.5),
+    "a rate wider than the study's": assumption("feedforward_rate.load_force", 2.0, 2.0),
+    "no rate among the assumptions": lambda data: own(data).update(
+        assumptions=[a for a in own(data)["assumptions"] if a["name"] != "feedforward_rate.load_force"]
+    ),
+    "a negative rate": in_study("uncertainty", "disturbances", "load_force", "rate", value=-5e4),
+    "half a period more of delay": delay(1.5e-3),
+    "two periods of delay": delay(2e-3),
+    "no delay": delay(0.0),
+    "twenty periods of delay": delay(20e-3),
+    "a negative delay": delay(-1e-3),
+    "a stronger network": gain("gamma_2", 1.5),
+    "a weaker network": gain("gamma_2", 0.6),
+    "no network gain": gain("gamma_2", 0.0),
+    "a network in the first row": in_study_and_gain("gamma_1", 1.0),
+    "a network that is full": in_study_and_gain("phi_2", 40.0),
+    "a network that holds nothing": in_study_and_gain("phi_2", 0.0),
+    "a preload beyond its bound": in_study_and_gain("preload_2", 100.0),
+    "a preload far away": in_study_and_gain("preload_2", 20.0),
+    "golden estimate": set_at("golden", 3, "phi", 1, value=0.0),
+    "golden estimate afterwards": set_at("golden", 3, "phi_next", 1, value=1.0),
+    "golden vectors without estimates": lambda data: [v.pop("phi") for v in own(data)["golden"]],
+    "a reference that does not rest": in_study("reference", "dwell_s", value=0.0),
     "smaller ball": ultimate(Fraction(95, 100)),
     "sign in the plant": operation("plant", "sub", "add"),
     "product made a sum": operation("plant", "mul", "add"),
@@ -345,7 +470,7 @@ MUTATIONS = {
     "no limits": set_at("model", "limits", value=[]),
     "a limit less": lambda data: drive(data)["limits"].pop("speed"),
     "shorter stroke": in_drive("stroke", value=[0.0, 0.39]),
-    "tighter requirement": in_study("requirements", "tracking_error_m", value=0.00018),
+    "tighter requirement": in_study("requirements", "tracking_error_m", value=0.000013),
     "requirement of zero": in_study("requirements", "tracking_error_m", value=0.0),
     "larger initial error": in_study("uncertainty", "initial", "position", value=0.05),
     "more noise": in_study("uncertainty", "noise", "position", value=1e-3),
@@ -361,27 +486,8 @@ MUTATIONS = {
     "another kind of certificate": set_at("certificate", "kind", value="trust-me"),
     "another schema": at_top("schema", value="hdmm-opt/gains/1"),
     "a nominal value": set_at("nominal", "transmission", value=1.0),
-    **{f"without {name}": drop_obligation(name) for name in checker.REQUIRED["rac"]["sampled"]},
+    **{f"without {name}": drop_obligation(name) for name in checker.REQUIRED["rac"]["impulse"]},
 }  # fmt: skip
-#: The same for a composition.
-COMPOSED = {
-    "smaller outer gain": gain("beta_1", 0.9),
-    "larger inner gain": gain("beta_2", 1.1),
-    "wider inertia": both("motor_inertia", 1.5),
-    "faster decay": rational("decay", Fraction(11, 10)),
-    "smaller box": rational("half_widths", Fraction(9, 10), 0),
-    "smaller held error": rational("input_bound", Fraction(9, 10), 0),
-    "negative held error": rational("input_bound", Fraction(-1), 0),
-    "other weight": rational("weights", Fraction(3, 2), 1),
-    "negative weight": rational("weights", Fraction(-1), 1),
-    "larger nu": rational("young", Fraction(12, 10), 1),
-    "negative nu": rational("young", Fraction(-1), 0),
-    "leak from nowhere": set_at("certificate", "leak", 1, value="1000"),
-    "smaller ball": ultimate(Fraction(95, 100)),
-    "slower rate": rate(0.8),
-    "called sampled": set_at("certificate", "kind", value="sampled"),
-    **{f"without {name}": drop_obligation(name) for name in checker.REQUIRED["rac"]["composition"]},
-}
 
 
 @pytest.mark.parametrize("name", MUTATIONS)
@@ -392,15 +498,9 @@ def test_a_resealed_mutation_is_refused(name, document, resealed):
     assert "\n" not in report.message
 
 
-@pytest.mark.parametrize("name", COMPOSED)
-def test_a_resealed_mutation_of_a_composition_is_refused(name, composed, resealed):
-    COMPOSED[name](composed)
-    assert checker.check_text(resealed(composed)).status in (1, 2)
-
-
 @pytest.mark.parametrize(("name", "path", "value"), [
     ("authority", ("study", "plant", "joints", "actuator", "limits", "torque", "value"), 45.0),
-    ("accuracy", ("study", "requirements", "tracking_error_m"), 1e-4),
+    ("accuracy", ("study", "requirements", "tracking_error_m"), 1e-5),
 ])  # fmt: skip
 def test_what_would_pass_passes(name, path, value, document, resealed):
     """The smallest change that a failing verdict names is enough, and hardly more."""
@@ -415,8 +515,8 @@ def test_what_would_pass_passes(name, path, value, document, resealed):
     assert status(resealed(document)) == 1
 
 
-def test_resealing_without_a_change_keeps_the_verdict(document, composed, resealed):
-    assert status(resealed(document)) == status(resealed(composed)) == 0
+def test_resealing_without_a_change_keeps_the_verdict(document, resealed):
+    assert status(resealed(document)) == 0
 
 
 def test_provenance_is_outside_the_hash(document):
@@ -457,35 +557,9 @@ def test_a_chain_of_squares_does_not_explode(document, resealed):
 def test_exact_definiteness_agrees_with_eigenvalues(entries, shift):
     matrix = entries + entries.T + shift * np.eye(4, dtype=np.int64)
     smallest = np.linalg.eigvalsh(matrix.astype(float)).min()
-    found = checker.positive_definite([[Fraction(int(v)) for v in row] for row in matrix])
+    found = positive_definite([[Fraction(int(v)) for v in row] for row in matrix])
     if abs(smallest) > 1e-6:
         assert found == (smallest > 0)
-
-
-def test_theta_in_v_is_refused_where_the_gain_may_change_sign():
-    """x' = -1000 x + c u + w with c in [-0.1, 0.3]: a negative weight on θ̂ would buy any bound."""
-    z = ca.SX.sym("z", 4)
-    names = ("x", "u", "c", "w")
-    plant = from_casadi(ca.Function("p", [z], [ca.vertcat(1, -1000 * z[0] + z[2] * z[1] + z[3])]), names)
-    y = ca.SX.sym("y", 1)
-    law = (from_casadi(ca.Function("l", [y], [ca.SX(0)]), ("x",)),)
-    row = Row(state="x", unit="m", target="reference", controlled=True)
-    model = LoopModel(rows=(row,), input_map=(0,), inputs=("u",), plant=plant, law=law)
-    gains = (Gains(beta=1.0, epsilon=1e-3, delta=1.0, sigma=5000.0),)
-
-    def verdict_with(lower):
-        bounds = Bounds(
-            parameters={"c": Interval(lower, 0.3)}, disturbances={"w": Interval(-10.0, 10.0)}, nominal={},
-            reference=(Interval(0.0),) * 4, noise=(0.0,), initial=(1e-5,), period=1e-5,
-        )  # fmt: skip
-        found = certify(model, bounds, gains, np.array([1.0]))
-        assert isinstance(found, Composition)
-        honest = claim_of(model, bounds, gains, found)
-        forged = replace(honest, vectors={**honest.vectors, "leak": [Fraction(1, 10**9)]})
-        return verdict(honest), verdict(forged)
-
-    assert verdict_with(0.1) == (True, True)
-    assert verdict_with(-0.1) == (True, False)
 
 
 def test_tiny_arguments_do_not_keep_the_checker_busy():
@@ -514,6 +588,6 @@ def test_a_model_that_is_too_large_is_not_proved(document, resealed):
 
 def test_definiteness_is_strict():
     singular = [[Fraction(1), Fraction(1)], [Fraction(1), Fraction(1)]]
-    assert not checker.positive_definite(singular)
+    assert not positive_definite(singular)
     singular[1][1] += Fraction(1, 10**60)
-    assert checker.positive_definite(singular)
+    assert positive_definite(singular)

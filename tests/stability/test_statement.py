@@ -25,7 +25,7 @@ BOUNDED = (
     r"study\.plant\.joints\.\w+\.stroke_m\.\d", r"study\.reference\.limits\.\w+",
     r"members\.0\.certificate\..*", r"study\.validation\.transient_s", r"study\.uncertainty\.disturbances\.\w+\.course",
     r"study\.controller\.modelling\.\d", r"study\.requirements\.\w+", r"study\.controller\.members\.\w+\.\w+\.(min|max)",
-    r"members\.0\.gains\.\d\.(min|max|value)", r"members\.0\.nominal\.load_force",
+    r"members\.0\.gains\.\d+\.(min|max|value)", r"members\.0\.nominal\.load_force",
     r"members\.0\.model\.(plant|law\.\d)\.inputs\.\d+",  # the forger lists them anew
 )  # fmt: skip
 
@@ -260,10 +260,12 @@ def dummy_speed(d):
         certificate[key].append("1/1000")
     certificate["envelope"]["ultimate"].append("1/1000")
     certificate["split"].append(1)
+    certificate["force"] = [[*row, "0"] for row in certificate["force"]] + [["0", "0", "0", "-100"]]
+    certificate["drive"].append(["0"])
     for cell in certificate["cells"]:
-        cell["transform"] = [[*row, "0"] for row in cell["transform"]] + [["0"] * 3 + ["1"]]
-        for key in ("reach", "start", "shape"):
-            cell[key].append("1/1000")
+        columns = [[*row, "0"] for row in cell["columns"]]
+        cell["columns"] = [*columns[:3], ["0"] * len(columns) + ["1"], *columns[3:]]
+        cell["blocks"].append(1)
     for vector in entry["golden"]:
         vector["x"].append(0.0)
     assert len(model["rows"]) == count
@@ -389,7 +391,7 @@ def loads_of_bodies_without_weight(d):
     outputs = []
     for k, entry in enumerate(d["members"]):
         inertia = next(a["lower"] for a in entry["assumptions"] if a["name"] == "parameter.load_inertia")
-        load = next(a for a in entry["assumptions"] if a["name"] == "disturbance.load_force")
+        load = next(a for a in entry["assumptions"] if a["name"] == "feedforward.load_force")
         operations += [["const", repr(inertia)], ["const", repr((load["lower"] + load["upper"]) / 2)]]
         at_ = len(operations)
         operations += [["mul", k, at_ - 2], ["add", at_, at_ - 1], ["add", at_ + 1, 5]]

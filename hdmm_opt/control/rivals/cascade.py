@@ -64,7 +64,7 @@ class Cascade(ABC):
     def outer(self, x: Any, r: Any, z: Any, gains: Any, command: Command, period: float) -> tuple[Any, Any]:
         """The command of the speed's row, and the states after a period."""
 
-    def start(self, x: Sequence[float]) -> list[float]:
+    def start(self, x: Sequence[float], gains: Sequence[float]) -> list[float]:
         """All states start at zero."""
         return [0.0] * self.states
 

@@ -1,17 +1,17 @@
-"""The sampled certificate against worst cases that are computed without it."""
+"""The impulse-response certificate against worst cases that are computed without it."""
 
 from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 import pytest
-from known_answers import DISTURBANCE, certify_sampled_chain, chain_bounds, claim_of, integrator_chain, verdict
+from known_answers import DISTURBANCE, certify_impulse_chain, chain_bounds, claim_of, integrator_chain, verdict
 
-from stability import Bounds, Failure, Gains, Interval, LoopModel, Row, Sampled, certify_sampled, from_casadi
+from stability import Bounds, Failure, Gains, Impulse, Interval, LoopModel, Row, certify_impulse, from_casadi
 
 
 def bound(found):
-    assert isinstance(found, Sampled), found
+    assert isinstance(found, Impulse), found
     return 1e3 * float(found.ultimate[0])
 
 
@@ -49,7 +49,7 @@ def test_oracle_of_the_sampled_double_integrator(period, published):
     """Theory §3: the exact sampled worst case stays 0.544 mm; the quadratic certificate gives the published figure."""
     exact = peak((15.0, 100.0), period)
     assert exact == pytest.approx(0.544, abs=2e-3)
-    found = certify_sampled_chain((15.0, 100.0), period=period)
+    found = certify_impulse_chain((15.0, 100.0), period=period)
     assert exact < bound(found) < published
     gains = (Gains(beta=30.0), Gains(beta=200.0))
     assert verdict(claim_of(integrator_chain(2), chain_bounds(2, period=period), gains, found))
@@ -63,14 +63,14 @@ def test_oracle_of_the_sampled_double_integrator(period, published):
 def test_near_the_worst_case_and_never_below(bandwidths, spread):
     exact = peak(bandwidths, 1e-3)
     worst = exact / (1 - spread)  # at the smallest constant gain, the DC gain of an overdamped loop
-    found = bound(certify_sampled_chain(bandwidths, period=1e-3, spread=spread))
+    found = bound(certify_impulse_chain(bandwidths, period=1e-3, spread=spread))
     assert worst < found < worst * (1.06 if spread == 0 else 1.2)
 
 
 def test_unstable_rates_are_refused():
     """At (15, 100) the sampled loop is unstable from 20 ms."""
-    assert isinstance(certify_sampled_chain((15.0, 100.0), period=21e-3), Failure)
-    assert isinstance(certify_sampled_chain((15.0, 100.0), period=12e-3), Sampled)
+    assert isinstance(certify_impulse_chain((15.0, 100.0), period=21e-3), Failure)
+    assert isinstance(certify_impulse_chain((15.0, 100.0), period=12e-3), Impulse)
 
 
 @pytest.mark.parametrize(("inner", "stable"), [(300.0, True), (1900.0, True), (2100.0, False)])
@@ -82,8 +82,8 @@ def test_three_rows_agree_with_the_poles_of_the_map(inner, stable):
     push = np.array([[1e-9 / 6], [5e-7], [1e-3]])
     poles = np.linalg.eigvals(step - inner * push @ np.array([[15.0 * 100.0, 100.0, 1.0]]))
     assert (np.abs(poles).max() < 1) == stable
-    found = certify_sampled(model, base, gains, np.array([0.05, 1.0, 100.0]))
-    assert isinstance(found, Sampled) == stable
+    found = certify_impulse(model, base, gains, np.array([0.05, 1.0, 100.0]))
+    assert isinstance(found, Impulse) == stable
     assert not stable or verdict(claim_of(model, base, gains, found))
 
 
@@ -92,7 +92,7 @@ def first_order(product, **changed):
     base = chain_bounds(1, period=product / 10.0, disturbance=0.1)
     base = Bounds(**{**base.__dict__, **changed})
     gains = (Gains(beta=20.0),)
-    return integrator_chain(1), base, gains, certify_sampled(integrator_chain(1), base, gains, np.array([1e6]))
+    return integrator_chain(1), base, gains, certify_impulse(integrator_chain(1), base, gains, np.array([1e6]))
 
 
 @pytest.mark.parametrize("product", [0.05, 0.2, 0.5, 0.9])
@@ -111,8 +111,8 @@ def test_sampled_integrator_is_refused_from_the_stability_limit(product):
 
 @pytest.mark.parametrize("unit", [1e-8, 1e-3, 1.0, 1e3, 1e8])
 def test_bound_scales_with_the_unit(unit):
-    found = certify_sampled_chain((15.0, 100.0), unit=unit, period=1e-3)
-    assert bound(found) / unit == pytest.approx(bound(certify_sampled_chain((15.0, 100.0), period=1e-3)), rel=1e-3)
+    found = certify_impulse_chain((15.0, 100.0), unit=unit, period=1e-3)
+    assert bound(found) / unit == pytest.approx(bound(certify_impulse_chain((15.0, 100.0), period=1e-3)), rel=1e-3)
     model, base = integrator_chain(2, unit=unit), chain_bounds(2, period=1e-3)
     assert verdict(claim_of(model, base, (Gains(beta=30.0), Gains(beta=200.0)), found, accuracy=1e9, limit=1e20))
 
@@ -131,15 +131,15 @@ def test_an_initial_error_fades_with_the_transient():
 
 
 def test_cells_and_coordinates_only_help():
-    plain = certify_sampled_chain((15.0, 100.0), period=1e-3, spread=0.2)
-    refined = certify_sampled_chain((15.0, 100.0), period=1e-3, spread=0.2, refine=True)
+    plain = certify_impulse_chain((15.0, 100.0), period=1e-3, spread=0.2)
+    refined = certify_impulse_chain((15.0, 100.0), period=1e-3, spread=0.2, refine=True)
     assert bound(refined) <= bound(plain)
     gains = (Gains(beta=30.0), Gains(beta=200.0))
     assert verdict(claim_of(integrator_chain(2), chain_bounds(2, period=1e-3, spread=0.2), gains, refined))
 
 
 def test_a_continuous_law_is_no_business_of_this_certificate():
-    assert isinstance(certify_sampled_chain((15.0, 100.0)), Failure)
+    assert isinstance(certify_impulse_chain((15.0, 100.0)), Failure)
 
 
 def near_a_wall(noise):
@@ -155,7 +155,7 @@ def near_a_wall(noise):
         initial=(0.0,), period=1e-3,
     )  # fmt: skip
     gains = (Gains(beta=20.0),)
-    return model, bounds, gains, certify_sampled(model, bounds, gains, np.array([1.0]))
+    return model, bounds, gains, certify_impulse(model, bounds, gains, np.array([1.0]))
 
 
 def test_the_input_is_bounded_with_its_noise():
@@ -173,5 +173,5 @@ def test_the_input_is_bounded_with_its_noise():
 def test_a_stuck_actuator_is_never_proved():
     """An effectiveness that may be zero leaves no gain to prove anything with; one of a tenth is another matter."""
     for spread in (1.0, 1.5):
-        assert isinstance(certify_sampled_chain((15.0, 100.0), period=1e-3, spread=spread), Failure)
-    assert isinstance(certify_sampled_chain((1.0, 50.0), period=1e-3, spread=0.5), Sampled)
+        assert isinstance(certify_impulse_chain((15.0, 100.0), period=1e-3, spread=spread), Failure)
+    assert isinstance(certify_impulse_chain((1.0, 50.0), period=1e-3, spread=0.5), Impulse)

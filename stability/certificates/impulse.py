@@ -1,0 +1,262 @@
+"""The impulse-response certificate: any sampled loop with a dynamic controller, delay and complex poles included.
+
+Rows of the plant in deviations, divided by a middle inertia, are z' = a z + b v + ρ with constant a and b and
+
+    |ρ_i| <= μ_i |s_i| + (1 + μ_i)( Σ_j σ_ij |z_j| + Σ_k τ_ik |v_k| + D_i ),      s = a z + b v
+
+and the gains of the controller are constant but for pulses that are small multiples of |z| and |c|. With the L1 norms Λ
+of `responses.py`, the non-negative S that these bounds read off y = (z, s, v, c), and y0 what known bounds make of y,
+
+    sup y <= y0 + Λ S sup y   ⇒   sup y <= (I - Λ S)^-1 y0      where some s > 0 has Λ S s < s
+
+(Khammash and Pearson 1991; Dahleh and Diaz-Bobillo 1995, ch. 7). The part that starts at Z(0) without disturbance
+obeys the same with weights growth^periods. Inertias are constant: their ranges may be cut into cells.
+
+Nothing here proves anything; `checker.py` does, in fixed point.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..loops.box import Box, DeviationRows, UnboundedError
+from ..loops.deviation import NOTHING, deviation_rows, first_box, networks, rounded
+from ..loops.model import Bounds, Gains, LoopModel
+from ..loops.responses import Responses, responses
+from ..loops.stack import Stack, controller, delay_of, wiring
+from .certificate import Certificate, Failure
+from .small_gain import COARSE, FINE, Cell, Cut, cell_of, cells_of, closed, late_of, middle_of, small_gain
+
+Array = NDArray[np.float64]
+
+#: The box grows by this factor over what an iterate needs, and is accepted once it keeps this room.
+WIDENING, ROOM = 1.004, 1.001
+#: Iterations of the box.
+STEPS = 120
+
+
+@dataclass(frozen=True, kw_only=True)
+class Impulse(Certificate):
+    """An impulse-response certificate; `half_widths` and `ultimate` bound the deviations z_i.
+
+    Attributes:
+        box: Where the model was bounded.
+        force: Middle of J. Shape (n, n).
+        drive: Middle of B. Shape (n, m).
+        split: Number of equal parts of each inertia's range. Length n.
+        cells: One for each combination of parts, the last index running fastest.
+        rates: Bounds on |z_i'|. Shape (n,).
+        networks: States of the rows with a load network. Length q.
+        estimates: Bounds on their |φ̂|. Shape (q,).
+        capacity: What those must stay below. Shape (q,).
+    """
+
+    box: Box
+    force: Array
+    drive: Array
+    split: tuple[int, ...]
+    cells: tuple[Cell, ...]
+    rates: Array
+    networks: tuple[str, ...]
+    estimates: Array
+    capacity: Array
+
+
+def certify_impulse(
+    model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], limit: Array, *, refine: bool = False
+) -> Impulse | Failure:
+    """Search an impulse-response certificate for fixed gains.
+
+    Args:
+        model: Plant and law.
+        bounds: Assumptions, with a positive period.
+        gains: One for each controlled row.
+        limit: Largest admissible box, |z_i| <= limit_i. Shape (n,).
+        refine: Cut the ranges of the inertias; tighter, and slower.
+
+    Returns:
+        The numbers, or why there are none.
+
+    Not guaranteed: optimality; proof (see `checker.py`).
+    """
+    search = begun(model, bounds, gains, limit, fine=refine)
+    return search if isinstance(search, Failure) else search.run(bounds)
+
+
+def begun(
+    model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], limit: Array, *, fine: bool = False
+) -> Search | Failure:
+    """A search with the responses of its loop, or why there is none; arguments as in `Search`."""
+    if not bounds.period > 0:
+        return Failure(reason="a sampled loop needs a control period above 0")
+    try:
+        return Search(model, bounds, gains, limit, FINE if fine else COARSE)
+    except np.linalg.LinAlgError:
+        return Failure(reason="the loop has no coordinates in which a period contracts")
+    except UnboundedError as error:
+        return Failure(reason=str(error))
+
+
+@dataclass(frozen=True)
+class _Bound:
+    """What one cell reaches: forced part, all of it, and the transient's amplitude; over (z, s, v, c)."""
+
+    forced: Array
+    whole: Array
+    amplitude: Array
+    growth: float
+    rates: Array
+
+
+class Search:
+    """Fixed point of box -> enclosures -> small gain -> box; the responses are those of the first enclosures.
+
+    Args:
+        model: Plant and law.
+        bounds: Assumptions from which the middle of the loop is taken.
+        gains: One for each controlled row.
+        limit: Largest admissible box.
+        cut: How the ranges of the inertias are cut.
+    """
+
+    def __init__(self, model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], limit: Array, cut: Cut) -> None:
+        self.model, self.gains, self.limit = model, gains, limit
+        self.own = networks(model, gains)
+        self.steering, self.direct = wiring(model, self.own)
+        self.box = first_box(model, bounds, gains, np.maximum(np.array(bounds.initial), NOTHING * limit))
+        self.rows = deviation_rows(model, bounds, gains, self.box)
+        self.split = cut.of(self.rows)
+        self.force = np.array([rounded(row) for row in (self.rows.low + self.rows.high) / 2])
+        self.drive = np.array([rounded(row) for row in (self.rows.input_low + self.rows.input_high) / 2])
+        self.responses = [responses(self._stack(part, bounds)) for part in cells_of(self.rows, self.split)]
+
+    def _stack(self, rows: DeviationRows, bounds: Bounds) -> Stack:
+        mass = middle_of(rows)
+        whole, share = delay_of(bounds.delay, bounds.period)
+        return Stack(
+            a=self.force / mass[:, None], b=self.drive / mass[:, None], steering=self.steering, direct=self.direct,
+            control=controller(self.model, self.gains, rows, bounds.period), period=bounds.period, whole=whole,
+            share=share,
+        )  # fmt: skip
+
+    def run(self, bounds: Bounds) -> Impulse | Failure:
+        """The certificate under some assumptions, which may be other ones than the search was begun with."""
+        if any(r is None for r in self.responses):
+            return self._unstable(bounds)
+        try:
+            return self._settled(bounds)
+        except UnboundedError as error:
+            return Failure(reason=str(error))
+
+    def _settled(self, bounds: Bounds) -> Impulse | Failure:
+        known = [r for r in self.responses if r is not None]
+        box = self.box
+        for _ in range(STEPS):
+            rows = deviation_rows(self.model, bounds, self.gains, box)
+            parts = cells_of(rows, self.split)
+            found = [self._cell(part, r, bounds, box) for part, r in zip(parts, known, strict=True)]
+            solved = [entry for entry in found if isinstance(entry, _Bound)]
+            if len(solved) < len(found):
+                return next(entry for entry in found if isinstance(entry, Failure))
+            needed = self._needed(rows, solved, bounds)
+            have = [box.half_widths, box.input_bound, box.network_bound]
+            if all((want * ROOM <= own).all() for want, own in zip(needed, have, strict=True)):
+                return self._certificate(rows, known, solved, bounds, box)
+            if (needed[0] > self.limit).any():
+                worst = int(np.argmax(needed[0] / self.limit))
+                return Failure(reason="the certified set outgrows the operating box", row=worst)
+            grown = [np.where(w * ROOM <= o, o, w * WIDENING) for w, o in zip(needed, have, strict=True)]
+            box = replace(box, half_widths=grown[0], input_bound=grown[1], network_bound=grown[2])
+        return Failure(reason=f"the box did not settle in {STEPS} iterations", row=len(self.limit) - 1)
+
+    def _needed(self, rows: DeviationRows, solved: list[_Bound], bounds: Bounds) -> list[Array]:
+        n, m = len(self.limit), len(self.model.inputs)
+        whole = np.max([entry.whole for entry in solved], axis=0)
+        return [whole[:n], whole[2 * n : 2 * n + m] + late_of(rows, bounds), whole[2 * n + m :]]
+
+    def _cell(self, rows: DeviationRows, known: Responses, bounds: Bounds, box: Box) -> _Bound | Failure:
+        """The small-gain bounds of one cell."""
+        stack = known.stack
+        n = stack.sizes[0]
+        reads, push = small_gain(rows, stack, bounds)
+        first = self._start(rows, bounds, box)
+        plain = known.plain
+        forced = plain.rest[:, :n] @ push[:n] + plain.rest[:, n:] @ rows.demand_rate
+        forced = forced + plain.pulses @ push[n:] + plain.noise @ np.array(bounds.noise)
+        begun = plain.begin @ first
+        found = closed(plain, reads, np.column_stack([forced, forced + begun]))
+        if isinstance(found, Failure):
+            return replace(found, row=n - 1)
+        late, best = periods_in(bounds.transient, bounds.period), (math.inf, 1.0, found[:, 1])
+        for growth, sums in known.weighted.items():
+            shrinking = closed(sums, reads, (sums.begin @ first)[:, None])
+            if not isinstance(shrinking, Failure):
+                best = min(best, (shrinking[0, 0] * growth**-late, growth, shrinking[:, 0]), key=lambda way: way[0])
+        moved = stack.sources()[:n, n:] @ rows.demand_rate
+        rates = found[n : 2 * n, 1] + reads[:n] @ found[:, 1] + push[:n] + moved
+        return _Bound(found[:, 0], found[:, 1], best[2], best[1], rates)
+
+    def _start(self, rows: DeviationRows, bounds: Bounds, box: Box) -> Array:
+        """What Z(0) is made of, see `Stack.begin`.
+
+        A network starts at its preload under any demand of the range, or where it rested before.
+        """
+        own = [g for g in self.gains if g.gamma > 0]
+        released = [
+            max(abs(g.preload - low), abs(high - g.preload), settled)
+            for g, low, high, settled in zip(own, box.low, box.high, rows.settled, strict=True)
+        ]
+        return np.concatenate([bounds.initial, released, bounds.noise, rows.noise])
+
+    def _certificate(
+        self, rows: DeviationRows, known: list[Responses], solved: list[_Bound], bounds: Bounds, box: Box
+    ) -> Impulse:
+        n, m = len(self.limit), len(self.model.inputs)
+        settled = _after(solved, periods_in(bounds.transient, bounds.period))
+        whole = np.concatenate([box.half_widths, box.input_bound])
+        moving = whole
+        if bounds.rest[1] > 0:  # what a start makes of the loop has shrunk when the motion begins
+            late = _after(solved, periods_in(bounds.rest[1], bounds.period))
+            moving = np.minimum(whole, np.concatenate([late[:n], late[2 * n : 2 * n + m] + late_of(rows, bounds)]))
+        sizes = rows.sizes(moving, resting=False)
+        if bounds.rest[1] > 0:
+            sizes = np.maximum(sizes, rows.sizes(whole, resting=True))
+        decay = min(math.log(s.growth) for s in solved) / bounds.period
+        return Impulse(
+            decay=decay, half_widths=box.half_widths, input_bound=box.input_bound, ultimate=settled[:n],
+            effort=sizes[n:], states=sizes[:n], box=box, force=self.force, drive=self.drive,
+            split=self.split, cells=tuple(cell_of(r, s.growth, box) for r, s in zip(known, solved, strict=True)),
+            rates=np.max([s.rates for s in solved], axis=0),
+            networks=tuple(self.model.rows[i].state for i in self.own),
+            capacity=np.array([g.capacity for g in self.gains if g.gamma > 0]),
+            estimates=np.max(np.abs([box.low, box.high]), axis=0) + box.network_bound,
+        )  # fmt: skip
+
+    def _unstable(self, bounds: Bounds) -> Failure:
+        """Why a loop has no summable responses."""
+        from ..loops.stack import turn
+
+        part = cells_of(self.rows, self.split)[next(i for i, r in enumerate(self.responses) if r is None)]
+        stack = self._stack(part, bounds)
+        poles = np.linalg.eigvals(turn(stack, 1).image[:, : stack.order])
+        largest = float(np.max(np.abs(poles)))
+        rate = 1 / bounds.period
+        if largest >= 1 - 1e-9:
+            text = f"the nominal sampled loop is unstable, with a pole of size {largest:.4g} at {rate:g} Hz"
+        else:
+            text = f"no coordinates are found in which the loop contracts at {rate:g} Hz"
+        return Failure(reason=text, row=len(self.limit) - 1)
+
+
+def periods_in(time: float, period: float) -> int:
+    """Whole periods of a time."""
+    return math.floor(time / period * (1 + 1e-9))
+
+
+def _after(solved: list[_Bound], periods: int) -> Array:
+    """Bounds on y from so many periods after the start on."""
+    return np.max([np.minimum(s.forced + s.amplitude * s.growth**-periods, s.whole) for s in solved], axis=0)

@@ -1,0 +1,130 @@
+"""Cells of the inertias' ranges, what is uncertain in one, and the closed inequality sup y <= y0 + Λ S sup y."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..loops.box import Box, DeviationRows
+from ..loops.model import Bounds
+from ..loops.responses import Responses, Sums
+from ..loops.stack import Stack
+from .certificate import Failure
+
+Array = NDArray[np.float64]
+
+#: Largest small gain that is accepted: the checker rounds outwards.
+LARGEST = 0.999
+
+
+@dataclass(frozen=True)
+class Cut:
+    """How the ranges of the inertias are cut into equal parts.
+
+    Attributes:
+        width: Half the width that a part may have, as a share.
+        most: Parts of one range at most.
+        cells: Parts of all ranges together at most.
+    """
+
+    width: float
+    most: int
+    cells: int
+
+    def of(self, rows: DeviationRows) -> tuple[int, ...]:
+        """Number of parts of each range."""
+        wide = (rows.mass_high / rows.mass_low - 1) / 2
+        counts = np.clip(np.ceil(wide / self.width), 1, self.most)
+        while counts.prod() > self.cells:
+            after = np.where(counts > 1, wide / np.maximum(counts - 1, 1), np.inf)
+            counts[np.argmin(after)] -= 1
+        return tuple(int(v) for v in counts)
+
+
+#: For candidates of a search, and for a certificate that is refined.
+COARSE, FINE = Cut(0.06, 2, 4), Cut(0.02, 12, 15)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """What the checker needs to know of the loop for a part of the inertias' ranges.
+
+    Attributes:
+        columns: Coordinates V in which a period contracts, over Z in units of the box. Shape (order, order).
+        blocks: Sizes of their blocks.
+        groups: Numbers of periods whose responses are summed together.
+        growth: Weight of a period in the transient.
+    """
+
+    columns: Array
+    blocks: tuple[int, ...]
+    groups: tuple[int, ...]
+    growth: float
+
+
+def middle_of(rows: DeviationRows) -> Array:
+    """M0: the middle of 1/M. Shape (n,)."""
+    return 2 / (1 / rows.mass_low + 1 / rows.mass_high)
+
+
+def late_of(rows: DeviationRows, bounds: Bounds) -> Array:
+    """What the modelling term of each input changes until it acts. Shape (m,)."""
+    return (bounds.period + bounds.delay) * rows.drift
+
+
+def small_gain(rows: DeviationRows, stack: Stack, bounds: Bounds) -> tuple[Array, Array]:
+    """S over y = (z, s, v, c), and the known part of what acts: ρ, then pulses."""
+    n, m, q = stack.sizes
+    mass = middle_of(rows)
+    change = np.maximum(mass / rows.mass_low - 1, 1 - mass / rows.mass_high)
+    per, more = 1 / mass[:, None], (1 + change)[:, None]
+    spread = np.maximum(np.abs(rows.low * per - stack.a), np.abs(rows.high * per - stack.a))
+    loose = np.maximum(np.abs(rows.input_low * per - stack.b), np.abs(rows.input_high * per - stack.b))
+    ctl, noise = stack.control, np.array(bounds.noise)
+    reads = np.zeros((n + m + q, 2 * n + m + q))
+    reads[:n, :n], reads[:n, n : 2 * n], reads[:n, 2 * n : 2 * n + m] = more * spread, np.diag(change), more * loose
+    reads[n : n + m, :n], reads[n : n + m, 2 * n + m :] = ctl.feedback_spread, ctl.network_spread
+    reads[n + m :, :n], reads[n + m :, 2 * n + m :] = ctl.entry_spread, ctl.keep_spread
+    drift = (np.abs(stack.b) + loose) @ late_of(rows, bounds)
+    push = np.concatenate([
+        (1 + change) * (rows.disturbance / mass + drift), rows.noise + ctl.feedback_spread @ noise,
+        ctl.entry_spread @ noise,
+    ])  # fmt: skip
+    return reads, push
+
+
+def cells_of(rows: DeviationRows, split: tuple[int, ...]) -> list[DeviationRows]:
+    """The enclosures with each inertia's range cut into equal parts, every combination."""
+    low, width = rows.mass_low, (rows.mass_high - rows.mass_low) / np.array(split)
+    parts = []
+    for index in product(*(range(count) for count in split)):
+        begin = low + np.array(index) * width
+        parts.append(replace(rows, mass_low=begin, mass_high=begin + width))
+    return parts
+
+
+def closed(sums: Sums, reads: Array, known: Array) -> Array | Failure:
+    """(I - Λ S)^-1 known, where Λ S contracts. Shape of known."""
+    gain = np.hstack([sums.rest[:, : reads.shape[0] - sums.pulses.shape[1]], sums.pulses]) @ reads
+    radius = float(np.max(np.abs(np.linalg.eigvals(gain)), initial=0.0))
+    if radius < LARGEST:
+        return np.asarray(np.linalg.solve(np.eye(len(gain)) - gain, known), dtype=np.float64)
+    return Failure(reason=f"the uncertainty is too large for this loop: its small gain is {radius:.3g}, 1 is the limit")
+
+
+def cell_of(found: Responses, growth: float, box: Box) -> Cell:
+    """What the checker needs to know of some responses, in units of the box."""
+    stack = found.stack
+    unit = np.concatenate([box.half_widths, box.network_bound, np.tile(box.input_bound, stack.pending)])
+    columns = found.basis.columns / unit[:, None]
+    columns = columns / np.repeat(_sizes(columns, found.basis.blocks), found.basis.blocks)
+    return Cell(columns=columns, blocks=found.basis.blocks, groups=found.groups, growth=growth)
+
+
+def _sizes(columns: Array, blocks: tuple[int, ...]) -> Array:
+    """The largest entry of each block of columns."""
+    ends = np.cumsum((0, *blocks))
+    return np.array([np.abs(columns[:, c : c + size]).max() for c, size in zip(ends, blocks, strict=False)])

@@ -1,0 +1,199 @@
+"""The impulse-response certificate.
+
+Theorem: sup y <= y0 + Λ S sup y with Λ S s < s for some s > 0 gives sup y <= (I - Λ S)^-1 y0 (Khammash and Pearson
+1991; Dahleh and Diaz-Bobillo 1995, ch. 7). Obligations: contraction, small gain, invariance, accuracy. Must fail: a
+smaller box, less of what acts, a faster decay.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import product
+
+from .arithmetic import WORK, up
+from .claim import Cell, Claim
+from .limits import FIXED, NotProvedError
+from .loop import Loop
+from .matrices import Matrix, Whole, dot
+from .responses import FINE, NEAR, Responses
+from .turn import Turn
+
+#: What a guess is made for is enlarged by this share, so that the exact inequality is strict.
+ROOM = Fraction(1, 1 << 30)
+
+
+class Bounded:
+    """One cell: what y = (z, s, v, c) reaches, and how fast what a start makes of it shrinks."""
+
+    def __init__(self, turn: Turn, cell: Cell) -> None:
+        self.turn, self.cell = turn, cell
+        found = Responses(turn, cell)
+        self.spare = found.spare
+        plain, weighted = ([_fractions(part) for part in sums] for sums in found.sums)
+        self.reads, pulses = self._reads()
+        n, q, m = turn.n, turn.q, turn.m
+        self.gain = [self._gain(sums) for sums in (plain, weighted)]
+        forced = [dot(row[:n], turn.push) + dot(row[n:], turn.moving) for row in plain[0]]
+        forced = [v + dot(row, [*pulses, *turn.noise]) for v, row in zip(forced, plain[1], strict=True)]
+        first = [*turn.started()[0], Fraction(1)]
+        begun = [[dot(row, first) for row in sums[2]] for sums in (plain, weighted)]
+        self.forced = bounded(self.gain[0], forced)
+        self.whole = bounded(self.gain[0], [a + b for a, b in zip(forced, begun[0], strict=True)])
+        self.amplitude = bounded(self.gain[1], begun[1])
+        acted = [dot(row, self.whole) + push for row, push in zip(self.reads[:n], turn.push, strict=True)]
+        moved = [dot(row[n:], turn.moving) for row in turn.sources[:n]]
+        self.rates = [up(s + r + p) for s, r, p in zip(self.whole[n : 2 * n], acted, moved, strict=True)]
+        self.inputs = [v + late for v, late in zip(self.whole[2 * n : 2 * n + m], turn.late, strict=True)]
+        self.missed = self.whole[2 * n + m :]
+        assert len(self.missed) == q
+
+    def _reads(self) -> tuple[Matrix, list[Fraction]]:
+        """S: |ρ| and the pulses on inputs and networks over y; and what of the pulses is known."""
+        turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
+        nothing = [Fraction(0)] * q
+        reads = []
+        for i in range(n):
+            more = 1 + turn.change[i]
+            row = [more * v for v in turn.a_spread[i]]
+            row += [turn.change[i] * int(i == j) for j in range(n)]
+            reads.append([*row, *(more * v for v in turn.b_spread[i]), *nothing])
+        known = list(turn.blur) + nothing
+        for k, row in enumerate([*turn.act_spread, *turn.learn_spread]):
+            reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:]])
+            known[k] += dot(row[:n], turn.noise)
+        return [[up(v) for v in row] for row in reads], [up(v) for v in known]
+
+    def _gain(self, sums: list[Matrix]) -> Matrix:
+        """Λ S."""
+        n, m, q = self.turn.n, self.turn.m, self.turn.q
+        columns = list(zip(*self.reads, strict=True))
+        return [
+            [up(dot([*rest[:n], *pulses[: m + q]], column)) for column in columns]
+            for rest, pulses in zip(sums[0], sums[1], strict=True)
+        ]
+
+    def contracts(self) -> Fraction:
+        """1 - max (Λ S s)_i / s_i for an s > 0 in which the gain is small, of both sums."""
+        return min(1 - max(dot(row, s) / own for row, own in zip(gain, s, strict=True)) for gain in self.gain
+                   for s in [bounded(gain, [Fraction(1)] * len(gain))])  # fmt: skip
+
+
+def _fractions(part: Whole) -> Matrix:
+    return [[up(Fraction(v, 1 << FIXED)) for v in row] for row in part]
+
+
+def bounded(gain: Matrix, known: list[Fraction]) -> list[Fraction]:
+    """Y > 0 with known + gain y < y: nothing larger satisfies y <= known + gain y. The guess is of floats."""
+    count, room = len(known), ROOM * (max(known) or 1)
+    known = [k + room for k in known]
+    if max(*known, *(v for row in gain for v in row)) > MOST:
+        raise NotProvedError("the uncertainty is too large for this loop: its gain is not small")
+    work = [[float(int(i == j) - v) for j, v in enumerate(row)] + [float(k)] for i, (row, k) in
+            enumerate(zip(gain, known, strict=True))]  # fmt: skip
+    for i in range(count):
+        pivot = max(range(i, count), key=lambda k: abs(work[k][i]))
+        work[i], work[pivot] = work[pivot], work[i]
+        if not abs(work[i][i]) > 0:
+            break
+        work[i] = [v / work[i][i] for v in work[i]]
+        for k in range(count):
+            if k != i:
+                factor = work[k][i]
+                work[k] = [a - factor * b for a, b in zip(work[k], work[i], strict=True)]
+    if all(0 < row[-1] < 1e300 for row in work):
+        guess = [up(Fraction(row[-1])) for row in work]
+        if all(k - room + dot(row, guess) < own for row, own, k in zip(gain, guess, known, strict=True)):
+            return guess
+    raise NotProvedError("the uncertainty is too large for this loop: its gain is not small")
+
+
+class Impulse:
+    """Verdicts on a member: each cell of the inertias' ranges by itself."""
+
+    def __init__(self, claim: Claim, loop: Loop) -> None:
+        self.claim, self.loop = claim, loop
+        for cell in claim.cells:
+            rows, substeps = 5 * (2 * len(claim.rows) + 1), 2 * len(cell.groups) + FINE * NEAR
+            order = len(cell.columns)
+            WORK.one(
+                (rows * substeps * order * (len(claim.rows) + 1) + 8 * max(cell.groups) * order + 20 * order**3) // COST
+            )
+        cuts = []
+        for (low, high), count in zip(loop.mass, claim.split, strict=True):
+            width = (high - low) / count
+            cuts.append([(low + k * width, low + (k + 1) * width) for k in range(count)])
+        parts = zip(claim.cells, product(*cuts), strict=True)
+        self.cells = [Bounded(Turn(claim, loop, list(masses)), cell) for cell, masses in parts]
+
+    def contraction(self) -> Fraction:
+        """How far the slowest cell is from not contracting, with the weight of its transient."""
+        return min(cell.spare for cell in self.cells)
+
+    def small_gain(self) -> Fraction:
+        """1 less the gain of what is uncertain."""
+        return min(cell.contracts() for cell in self.cells)
+
+    def invariance(self) -> Fraction:
+        """Deviations, inputs, networks and demands stay inside the box in which the model was bounded."""
+        claim, spare = self.claim, []
+        for cell in self.cells:
+            spare += [1 - v for v in (*cell.whole[: cell.turn.n], *cell.inputs, *cell.missed)]
+        for found, taken in zip(self.loop.demand, claim.demand, strict=True):
+            size = max(abs(end) for end in taken) or Fraction(1)
+            spare += [(found[0] - taken[0]) / size, (taken[1] - found[1]) / size]
+        return min(spare)
+
+    def estimates(self) -> list[Fraction]:
+        """Bounds on |φ̂| of the rows with a network."""
+        pairs = zip(self.claim.demand, self.claim.network_bound, strict=True)
+        return [max(abs(low), abs(high)) + bound for (low, high), bound in pairs]
+
+    def _after(self, time: Fraction) -> list[Fraction]:
+        """Bounds on y from a time on, in units of the box."""
+        periods, found = int(time / self.claim.period), []
+        for cell in self.cells:
+            left = 1 / _power(cell.cell.growth, periods)
+            parts = zip(cell.forced, cell.amplitude, cell.whole, strict=True)
+            found.append([min(forced + left * start, whole) for forced, start, whole in parts])
+        return [max(column) for column in zip(*found, strict=True)]
+
+    def ultimate(self, i: int) -> Fraction:
+        """Bound on |z_i| from the end of the transient on."""
+        claim = self.claim
+        return min(up(self._after(claim.transient)[i] * claim.half_widths[i]), claim.half_widths[i])
+
+    def largest(self, name: str) -> Fraction:
+        """Bound on |input| as commanded, or on |state|: the start while the reference rests, what is left in motion."""
+        claim, loop, n, m = self.claim, self.loop, len(self.claim.rows), len(self.claim.inputs)
+        whole = [*claim.half_widths, *claim.input_bound]
+        if not claim.rest[1] > 0:
+            return loop.size(name, whole, resting=False)
+        after = self._after(claim.rest[1])
+        late = [max(cell.turn.late[k] for cell in self.cells) for k in range(m)]
+        moved = [*after[:n], *(v + w for v, w in zip(after[2 * n : 2 * n + m], late, strict=True))]
+        moving = [min(up(v * r), r) for v, r in zip(moved, whole, strict=True)]
+        return max(loop.size(name, moving, resting=False), loop.size(name, whole, resting=True))
+
+    def speed(self, i: int) -> Fraction:
+        """Bound on |z_i'| for all t."""
+        return up(max(cell.rates[i] for cell in self.cells) * self.claim.half_widths[i] / self.claim.period)
+
+    def rate(self) -> Fraction:
+        """A bound from below on the rate at which what a start makes shrinks, 1/s: ln g >= 2 (g - 1)/(g + 1)."""
+        least = min(cell.cell.growth for cell in self.cells)
+        return 2 * (least - 1) / (least + 1) / self.claim.period
+
+
+#: A power that is larger than this counts as this.
+MOST = Fraction(1 << 256)
+#: What a product of a summation costs, in products of intervals.
+COST = 40
+
+
+def _power(base: Fraction, exponent: int) -> Fraction:
+    """base^exponent for base >= 1, rounded down."""
+    found, bits = Fraction(1), FIXED
+    for bit in bin(exponent)[2:]:
+        found = found * found * (base if bit == "1" else 1)
+        found = min(Fraction((found.numerator << bits) // found.denominator, 1 << bits), MOST)
+    return found

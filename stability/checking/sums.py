@@ -1,0 +1,97 @@
+"""Integrals over a sub-step, and sums of bounds, in whole numbers rounded up.
+
+Theorem: ∫|f| <= max(|∫f|, h²/2 sup|f'|), for where f changes its sign it is no larger than the distance from there.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+from .limits import FIXED
+from .matrices import Ball, Whole, ball, exponential_of, times_up
+from .turn import Turn
+
+WHOLE = 1 << FIXED
+
+
+class Piece:
+    """Rows times exp(flow r) times the sources, integrated over a sub-step: exact areas, and bounds on slopes."""
+
+    def __init__(self, turn: Turn, length: Fraction) -> None:
+        size = len(turn.flow)
+        block = [[*(v * length for v in row), *(length * int(i == j) for j in range(size))]
+                 for i, row in enumerate(turn.flow)] + [[Fraction(0)] * (2 * size) for _ in range(size)]  # fmt: skip
+        whole, sources = exponential_of(block), ball(turn.sources)
+        self.forward = whole.part(slice(0, size), slice(0, size))
+        self.area = whole.part(slice(0, size), slice(size, None)) @ sources
+        grown = [[(max(v, Fraction(0)) if i == j else abs(v)) * length for j, v in enumerate(row)]
+                 for i, row in enumerate(turn.flow)]  # fmt: skip
+        self.ceiling = exponential_of(grown).sizes()
+        flow, span = ball([[abs(v) for v in row] for row in turn.flow]).sizes(), (length.numerator << FIXED)
+        span = span // length.denominator + 1
+        self.size = [[(v * span >> FIXED) + 1 for v in row] for row in times_up(self.ceiling, sources.sizes())]
+        self.slope = [[(v * span >> FIXED + 1) + 1 for v in row] for row in times_up(flow, self.size)]
+
+    def integral(self, rows: Ball) -> Whole:
+        """Bounds on ∫|rows exp(flow r) sources| dr."""
+        return larger((rows @ self.area).sizes(), times_up(rows.sizes(), self.slope))
+
+
+def through(rows: Ball, blocks: list[Ball], ends: list[int]) -> Ball:
+    """Rows times a block-diagonal matrix."""
+    parts = [rows.part(slice(None), slice(a, b)) @ block for a, b, block in zip(ends, ends[1:], blocks, strict=False)]
+    made = parts[0]
+    for part in parts[1:]:
+        made = made.beside(part)
+    return made
+
+
+def length_of(values: list[int]) -> int:
+    """Euclidean norm, rounded up."""
+    return abs(values[0]) if len(values) == 1 else math.isqrt(sum(v * v for v in values)) + 1
+
+
+def norm_of(block: Whole) -> int:
+    """Spectral norm of a block of one or two rows, rounded up."""
+    if len(block) == 1:
+        return abs(block[0][0])
+    (a, b), (c, d) = block
+    total, product = a * a + b * b + c * c + d * d, abs(a * d - b * c)
+    # the largest σ² is half of t + sqrt(t² - 4 det²)
+    return math.isqrt((total + math.isqrt(max(total * total - 4 * product * product, 0)) + 1) // 2 + 1) + 1
+
+
+def larger(first: Whole, second: Whole) -> Whole:
+    """The larger of each pair of entries."""
+    return [[max(a, b) for a, b in zip(x, y, strict=True)] for x, y in zip(first, second, strict=True)]
+
+
+def added(*parts: Whole) -> Whole:
+    """Sum of matrices."""
+    return [[sum(values) for values in zip(*rows, strict=True)] for rows in zip(*parts, strict=True)]
+
+
+def times_ratio(part: Whole, numerator: int, denominator: int = 1) -> Whole:
+    """A matrix times a ratio, rounded up."""
+    return [[-(-v * numerator // denominator) for v in row] for row in part]
+
+
+def scaled_up(value: int, factor: Fraction) -> int:
+    """A number times a ratio, rounded up."""
+    return -(-value * factor.numerator // factor.denominator)
+
+
+class Weighted:
+    """Sums or largest values over groups, plain and with weights."""
+
+    def __init__(self, rows: int, columns: int) -> None:
+        self.sums = [[[0] * columns for _ in range(rows)] for _ in range(2)]
+
+    def add(self, found: Whole, weight: int) -> None:
+        """Add a group."""
+        self.sums = [added(self.sums[0], found), added(self.sums[1], times_ratio(found, weight, WHOLE))]
+
+    def keep(self, found: Whole, weight: int) -> None:
+        """Keep what a group has that is larger."""
+        self.sums = [larger(self.sums[0], found), larger(self.sums[1], times_ratio(found, weight, WHOLE))]

@@ -1,0 +1,225 @@
+"""One control period of the whole sampled loop: plant, load networks and pending inputs as one exact map.
+
+Theorem: variation of constants. Must fail: another delay, a network or a pending input left out.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from .arithmetic import ZERO, Interval, add, down, mul, neg, up
+from .claim import Claim
+from .limits import ROUNDING
+from .loop import Loop
+from .matrices import Ball, Matrix, ball, exponential_of, eye
+
+#: Sub-steps of a period for outputs.
+PHASES = 4
+
+
+def split_of(rows: list[list[Interval]]) -> tuple[Matrix, Matrix]:
+    """Middles of intervals, and distances of the ends from them."""
+    middle = [[down((low + high) / 2) for low, high in row] for row in rows]
+    pairs = zip(rows, middle, strict=True)
+    return middle, [[up(max(v[1] - m, m - v[0])) for v, m in zip(row, own, strict=True)] for row, own in pairs]
+
+
+class Turn:
+    """The loop of constant numbers for a part of the inertias' ranges, and what it leaves out.
+
+    Everything is in units of the box: z_i of half_widths_i, v_k of input_bound_k, φ̂ - φ* of network_bound_q, time of
+    the period. Z holds z, φ̂ - φ*, and the pending inputs, newest first; columns of maps are over Z, then pulses on the
+    new inputs, pulses on the networks, and measurement errors of the states.
+    """
+
+    def __init__(self, claim: Claim, loop: Loop, masses: list[Interval]) -> None:
+        self.claim, self.loop = claim, loop
+        self.n, self.m, self.q = len(claim.rows), len(claim.inputs), len(claim.networks)
+        self.order = self.n + self.q + self.m * claim.pending
+        self.width = self.m + self.q + self.n
+        self._plant(masses)
+        self._controller()
+        self._flow()
+        self._phases()
+        self._sample()
+
+    def _plant(self, masses: list[Interval]) -> None:
+        """a, b and how far they may be from the truth; μ; known bounds on what acts."""
+        claim, loop, n, m = self.claim, self.loop, self.n, self.m
+        mass = [down(2 / (1 / low + 1 / high)) for low, high in masses]
+        self.change = [up(max(m0 / low - 1, 1 - m0 / high)) for m0, (low, high) in zip(mass, masses, strict=True)]
+        rate = [claim.period / (m0 * r) for m0, r in zip(mass, claim.half_widths, strict=True)]
+
+        def scaled(found: Interval, taken: Fraction, factor: Fraction) -> tuple[Fraction, Fraction]:
+            return taken * factor, up(max(found[1] - taken, taken - found[0], Fraction(0)) * factor)
+
+        force = [[scaled(loop.entry(i, j), claim.force[i][j], rate[i] * claim.half_widths[j]) for j in range(n)]
+                 for i in range(n)]  # fmt: skip
+        drive = [[scaled(loop.closed[i].get(f"e{k}", ZERO), claim.drive[i][k], rate[i] * claim.input_bound[k])
+                  for k in range(m)] for i in range(n)]  # fmt: skip
+        (self.a, self.a_spread), (self.b, self.b_spread) = (
+            ([[v[0] for v in row] for row in part], [[v[1] for v in row] for row in part]) for part in (force, drive)
+        )
+        self.late = [up(loop.late(k) / claim.input_bound[k]) for k in range(m)]
+        self.push = [
+            up((1 + self.change[i]) * (loop.disturbance[i] * rate[i] + sum(
+                ((abs(self.b[i][k]) + self.b_spread[i][k]) * self.late[k] for k in range(m)), Fraction(0))))
+            for i in range(n)
+        ]  # fmt: skip
+        pairs = zip(loop.demand_rate, claim.network_bound, strict=True)
+        self.moving = [up(claim.period * r / bound) for r, bound in pairs]
+
+    def _controller(self) -> None:
+        """K, C, G and A of the discrete part: middles and distances from them; how Z(0) follows from Q(0) and φ̂(0)."""
+        claim, loop, n, q = self.claim, self.loop, self.n, self.q
+        scale = [*claim.half_widths, *claim.network_bound]
+        own = claim.networks
+
+        def action(i: int) -> list[Interval]:
+            """-b_i Q_i - c_i over (z, c)."""
+            row = [mul(neg(loop.half[i]), v) for v in error(i)]
+            if i in own:
+                row[n + own.index(i)] = add(row[n + own.index(i)], (Fraction(-1), Fraction(-1)))
+            return row
+
+        def error(i: int) -> list[Interval]:
+            """Q_i over (z, c)."""
+            row, target = [ZERO] * (n + q), claim.rows[i]["target"]
+            row[i] = (Fraction(1), Fraction(1))
+            return (
+                row if isinstance(target, str) else [add(v, neg(w)) for v, w in zip(row, action(target), strict=True)]
+            )
+
+        acts = [[mul(v, _point(s / claim.input_bound[k])) for v, s in zip(action(row), scale, strict=True)]
+                for k, row in enumerate(claim.input_map)]  # fmt: skip
+        learns = []
+        for j, i in enumerate(own):
+            rate = mul(loop.gain[i].gamma, _point(claim.period / claim.network_bound[j]))
+            learns.append([mul(mul(rate, v), _point(s)) for v, s in zip(error(i), scale, strict=True)])
+        (self.act, self.act_spread), (self.learn, self.learn_spread) = split_of(acts), split_of(learns)
+        starts = []
+        for i, row in enumerate(claim.rows):
+            start, target = [ZERO] * (n + q), row["target"]
+            start[i] = _point(Fraction(1))
+            if not isinstance(target, str):
+                start[target] = mul(neg(loop.gain[target].beta), _point(Fraction(1, 2)))
+                if target in own:
+                    start[n + own.index(target)] = _point(Fraction(-1))
+            starts.append([mul(v, _point(s / claim.half_widths[i])) for v, s in zip(start, scale, strict=True)])
+        self.start, self.start_spread = split_of(starts)
+        self.noise = [up(v / r) for v, r in zip(claim.noise, claim.half_widths, strict=True)]
+        self.blur = [up(loop.term_noise(row) / claim.input_bound[k]) for k, row in enumerate(claim.input_map)]
+
+    def _flow(self) -> None:
+        """(z, p)' = flow (z, p) + (b, 0) held; p is what each demand moves since the last sample."""
+        claim, n, m, q = self.claim, self.n, self.m, self.q
+        width = n + q
+        bounds = claim.network_bound
+        pairs, own = list(zip(claim.input_map, claim.input_bound, strict=True)), list(enumerate(claim.networks))
+        self.direct = [[Fraction(int(row == i)) * bounds[j] / size for j, i in own] for row, size in pairs]
+        self.flow = [[Fraction(0)] * width for _ in range(width)]
+        self.sources = [[Fraction(int(i == j)) for j in range(width)] for i in range(width)]
+        for i in range(n):
+            self.flow[i][:n] = self.a[i]
+            for j, row in enumerate(claim.networks):
+                self.flow[i][n + j] = sum((self.b[i][k] * self.direct[k][j] for k in range(m)), Fraction(0))
+                if claim.rows[i]["target"] == row:
+                    self.sources[i][n + j] = bounds[j] / claim.half_widths[i]
+
+    def held(self, k: int) -> Ball:
+        """The input computed k samples ago, over the columns."""
+        n, m, q, order = self.n, self.m, self.q, self.order
+        rows = [[Fraction(0)] * (order + m + q + n) for _ in range(m)]
+        for i, row in enumerate(rows):
+            if k:
+                row[n + q + m * (k - 1) + i] = Fraction(1)
+                continue
+            row[: n + q], row[order + m + q :] = self.act[i], self.act[i][:n]
+            row[order + i] = Fraction(1)
+        return ball(rows)
+
+    def _phases(self) -> None:
+        """(z, p) and the held input at both ends of every sub-step, over the columns."""
+        claim, n, m, q = self.claim, self.n, self.m, self.q
+        parts = [(claim.share, self.held(claim.whole + 1))] if claim.share > 0 else []
+        parts.append((1 - claim.share, self.held(claim.whole)))
+        whole = [[*row, *(self.b[i] if i < n else [Fraction(0)] * m)] for i, row in enumerate(self.flow)]
+        whole += [[Fraction(0)] * (n + q + m) for _ in range(m)]
+        x = Ball([[int(i == j and i < n) * eye(1).rows[0][0] for j in range(self.order + m + q + n)]
+                  for i in range(n + q)], 0)  # fmt: skip
+        self.steps: list[Fraction] = []
+        self.ends: list[tuple[Ball, Ball, Ball]] = []
+        for share, acting in parts:
+            pieces = max(1, round(PHASES * share))
+            length = share / pieces
+            forward = exponential_of([[v * length for v in row] for row in whole])
+            free, driven = (
+                forward.part(slice(0, n + q), slice(0, n + q)),
+                forward.part(slice(0, n + q), slice(n + q, None)),
+            )
+            for _ in range(pieces):
+                following = free @ x + driven @ acting
+                self.ends.append((x, following, acting))
+                self.steps.append(length)
+                x = following
+        self.end = x
+
+    def _sample(self) -> None:
+        """Z at the next sample over the columns; how (z, p) at the end of a period enters it; what Z(0) is made of."""
+        claim, n, m, q, order = self.claim, self.n, self.m, self.q, self.order
+        fold = [[Fraction(0)] * (n + q) for _ in range(order)]
+        kept = [[Fraction(0)] * (order + m + q + n) for _ in range(order)]
+        for i in range(n):
+            fold[i][i] = Fraction(1)
+        for j in range(q):
+            fold[n + j][n + j], kept[n + j][n + j] = Fraction(-1), Fraction(1)
+            for i, value in enumerate(self.learn[j]):
+                kept[n + j][i] += value
+            kept[n + j][order + m + q :] = self.learn[j][:n]
+            kept[n + j][order + m + j] = Fraction(1)
+        moved = ball(kept)
+        for k in range(claim.pending):
+            for i in range(m):
+                fold[n + q + m * k + i][n:] = self.direct[i]
+            held = self.held(k)
+            for i in range(m):
+                moved.rows[n + q + m * k + i] = held.rows[i]
+        self.fold = ball(fold)
+        self.image = self.fold @ self.end + moved
+        # Z(0) over Q(0), c(0), measurement errors, errors of the modelling terms
+        width = 2 * n + q + m
+        begin = [[*row, *([Fraction(0)] * (n + m))] for row in self.start]
+        begin += [[Fraction(int(c == n + j)) for c in range(width)] for j in range(q)]
+        for _ in range(claim.pending):
+            for k in range(m):
+                row = [sum((self.act[k][i] * self.start[i][c] for i in range(n)), Fraction(0)) for c in range(n + q)]
+                for j in range(q):
+                    row[n + j] += self.act[k][n + j]
+                begin.append([*row, *self.act[k][:n], *(Fraction(int(i == k)) for i in range(m))])
+        self.begin = ball(begin)
+
+    def started(self) -> tuple[list[Fraction], list[Fraction]]:
+        """What Z(0) is made of, and bounds on what is not known of its coefficients.
+
+        A network starts at its preload under any demand of the range, or where it rested before.
+        """
+        claim, n, q = self.claim, self.n, self.q
+        first = [up(v / r) for v, r in zip(claim.initial, claim.half_widths, strict=True)]
+        for j, i in enumerate(claim.networks):
+            (low, high), preload = claim.demand[j], self.loop.gain[i].preload
+            away = max(abs(preload - low), abs(high - preload)) + ROUNDING * abs(preload)
+            first.append(up(max(away, self.loop.settled[j]) / claim.network_bound[j]))
+        loose = [sum((s * v for s, v in zip(row, first, strict=True)), Fraction(0)) for row in self.start_spread]
+        size = [sum((abs(s) * v for s, v in zip(row, first, strict=True)), Fraction(0)) for row in self.start]
+        unsure = [up(v) for v in loose] + [Fraction(0)] * q
+        felt = [z + w + noise for z, w, noise in zip(size, loose, self.noise, strict=True)] + first[n:]
+        held = [
+            up(sum((abs(v) * w for v, w in zip(self.act[k][:n], loose, strict=True)), Fraction(0))
+               + sum((s * v for s, v in zip(self.act_spread[k], felt, strict=True)), Fraction(0)))
+            for k in range(self.m)
+        ]  # fmt: skip
+        return [*first, *self.noise, *self.blur], unsure + held * claim.pending
+
+
+def _point(value: Fraction) -> Interval:
+    return value, value

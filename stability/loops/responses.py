@@ -1,0 +1,281 @@
+"""What a sampled loop makes of everything that acts on it: L1 norms of its impulse responses, in floats.
+
+    Λ_oi = sup over phases of Σ_k ∫ |h_oi(θ + kT, s)| ds
+
+for the outputs o = (z, s = a z + b v, v) at any time and c at the samples. h is a kernel of two times: the response of
+output o at a phase of a period to an impulse at a time s of an earlier one (Bamieh, Dahleh and Pearson 1993 for sampled
+data; Dahleh and Diaz-Bobillo 1995, ch. 7, for what such norms decide).
+
+Between the phases of a grid an output is interpolated with h²/8 of its second derivative on top. Sources are summed
+over sub-steps of length h in groups of p periods: where f keeps its sign, Σ∫|f| = |Σ∫f|; where it does not, f is no
+larger than the distance from a zero times its slopes, so Σ∫|f| <= p h ((p-1)/2 sup|Δf| + h/2 sup|f'|) with Δf the
+change from a period to the next. Slopes, and what comes after the last group, are bounded in coordinates in which a
+period contracts every block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .basis import Basis, basis_of, diagonal
+from .stack import Stack, Turn, turn
+
+Array = NDArray[np.float64]
+
+#: Sub-steps of a period for outputs; for sources, in the first periods and after.
+PHASES, FINE, COARSE = 4, 4, 2
+#: Periods with the fine grid; after them a group is this share of the periods before, and of the slowest mode's time.
+NEAR, GROWING, SLOWEST = 12, 0.125, 0.12
+#: Largest group.
+LARGEST = 2_000
+#: Periods are summed until what is left is this small, and how many groups at most.
+LEFT, LONGEST = 3e-2, 400
+#: Weights of a period in the transient, as powers of the slowest mode.
+SHARES = (0.5, 0.8, 0.93)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sums:
+    """L1 norms from what acts to the outputs (z, s, v, c).
+
+    Attributes:
+        rest: From ρ_1 … ρ_n and the rates of the demands. Shape (outputs, n + q).
+        pulses: From errors of the new inputs and of the networks. Shape (outputs, m + q).
+        noise: From measurement errors. Shape (outputs, n).
+        begin: Largest responses to what Z(0) is made of. Shape (outputs, 2 n + q + m).
+    """
+
+    rest: Array
+    pulses: Array
+    noise: Array
+    begin: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Responses:
+    """The sums of a stack, plain and weighted with powers of a growth a period.
+
+    Attributes:
+        stack: The loop.
+        basis: Coordinates of the tail.
+        groups: Numbers of periods that are summed together.
+        plain: The sums.
+        weighted: By growth.
+    """
+
+    stack: Stack
+    basis: Basis
+    groups: tuple[int, ...]
+    plain: Sums
+    weighted: Mapping[float, Sums]
+
+
+def ceiling(matrix: Array, time: float) -> Array:
+    """Entrywise at least |exp(matrix r)| for 0 <= r <= time."""
+    from scipy.linalg import expm
+
+    size = np.abs(matrix)
+    np.fill_diagonal(size, np.maximum(np.diag(matrix), 0.0))
+    return np.asarray(expm(size * time), dtype=np.float64)
+
+
+def responses(stack: Stack) -> Responses | None:
+    """Sum the responses of a loop; None where it is not stable, or contracts in no coordinates that are found."""
+    one = turn(stack, PHASES)
+    order = stack.order
+    f = one.image[:, :order]
+    radius = float(np.max(np.abs(np.linalg.eigvals(f))))
+    if not radius < 1 - 1e-9:
+        return None
+    basis = basis_of(f)
+    if basis is None:
+        return None
+    reach = float(np.max(np.abs(np.linalg.eigvals(basis.norms))))
+    if not reach < 1 - 1e-9:
+        return None
+    time = -1 / np.log(min(max(radius, 1e-6), 1 - 1e-12))
+    growths = [float(f"{np.exp(share / time):.8e}") for share in SHARES]
+    growths = [g for g in growths if reach * g < 1 - 1e-9]
+    return _Sum(stack, one, basis, groups_of(time), growths).made()
+
+
+def groups_of(time: float) -> tuple[int, ...]:
+    """Numbers of periods that are summed together, for a slowest mode of so many periods."""
+    found, done = [1] * NEAR, NEAR
+    while done < -np.log(LEFT) * time and len(found) < LONGEST:
+        found.append(max(1, int(min(GROWING * done, SLOWEST * time, LARGEST))))
+        done += found[-1]
+    return tuple(found)
+
+
+class _Step:
+    """Integrals of rows · exp(flow r) · sources over a sub-step, and bounds on the slopes."""
+
+    def __init__(self, flow: Array, sources: Array, length: float) -> None:
+        from scipy.linalg import expm
+
+        n = len(flow)
+        block = np.zeros((2 * n, 2 * n))
+        block[:n, :n], block[:n, n:] = flow, np.eye(n)
+        whole = np.asarray(expm(block * length))
+        self.forward, self.area, self.ceiling = whole[:n, :n], whole[:n, n:] @ sources, ceiling(flow, length)
+        self.size = length * (self.ceiling @ np.abs(sources))
+        self.slope = length / 2 * (np.abs(flow) @ self.size)
+
+    def integral(self, rows: Array) -> Array:
+        """A bound on ∫|rows exp(flow r) sources| dr. Shape (..., sources)."""
+        return np.maximum(np.abs(rows @ self.area), np.abs(rows) @ self.slope)
+
+
+class _Sum:
+    """One summation."""
+
+    def __init__(
+        self, stack: Stack, one: Turn, basis: Basis, groups: tuple[int, ...], growths: Sequence[float]
+    ) -> None:
+        self.stack, self.one, self.basis, self.groups, self.growths = stack, one, basis, groups, growths
+        self.flow, self.sources, order = stack.flow(), stack.sources(), stack.order
+        self.lengths: dict[float, _Step] = {}
+        n, m, q = stack.sizes
+        self.outputs = 2 * n + m
+        self.cx = np.vstack([
+            np.eye(n, n + q), np.hstack([stack.a, stack.b @ stack.direct]), np.hstack([np.zeros((m, n)), stack.direct]),
+        ])  # fmt: skip
+        through = np.vstack([np.zeros((n, m)), stack.b, np.eye(m)])
+        early = [self.cx @ x + through @ v for x, v in zip(one.begin[:-1], one.held, strict=True)]
+        late = [self.cx @ x + through @ v for x, v in zip(one.begin[1:], one.held, strict=True)]
+        chosen = np.eye(order + m + q + n)[n : n + q]
+        self.rows = np.vstack([*early, *late, chosen])
+        inside = basis.inverse @ one.image[:, :order] @ basis.columns
+        self.block = diagonal(inside, basis.blocks)
+        self.step_back = self.block - np.eye(order)
+        self.acting = basis.inverse @ np.hstack([one.image[:, order:], stack.begin()])
+
+    def _step(self, length: float) -> _Step:
+        if length not in self.lengths:
+            self.lengths[length] = _Step(self.flow, self.sources, length)
+        return self.lengths[length]
+
+    def made(self) -> Responses:
+        """The sums."""
+        n, m, q = self.stack.sizes
+        order, growths = self.stack.order, [1.0, *self.growths]
+        past, starts, totals = self._past()
+        done = np.cumsum((0, *self.groups))
+        # what acts in period P meets period P + k + 1 with weight growth^(k + 1); a group has the weight of its end
+        weights = np.array(growths)[:, None] ** done[1:]
+        rest = self._integrals(past, totals, weights)
+        felt, begun = self._discrete(past, totals, weights, m + q + n)
+        now, fixed = self._current(), np.abs(self.rows[:, order:])
+        last = self.basis.of_rows(starts[-1] @ self.block)
+        sums = []
+        for k, growth in enumerate(growths):
+            left = self._left(last, growth, growth ** float(done[-1]))
+            acted = fixed + felt[k] + left[1][:, : m + q + n]
+            first = np.maximum(begun[k], left[2][:, m + q + n :])
+            sums.append(Sums(
+                rest=self._between(now + rest[k] + left[0], own=True),
+                pulses=self._between(acted[:, : m + q]), noise=self._between(acted[:, m + q :]),
+                begin=self._between(first),
+            ))  # fmt: skip
+        return Responses(
+            stack=self.stack, basis=self.basis, groups=self.groups, plain=sums[0],
+            weighted=dict(zip(self.growths, sums[1:], strict=True)),
+        )  # fmt: skip
+
+    def _past(self) -> tuple[Array, Array, Array]:
+        """Rows over y at the start of each group, rows at the last period of each, and sums over each group."""
+        order = self.stack.order
+        powers, sums = [np.eye(order)], [np.zeros((order, order))]
+        for _ in range(max(self.groups)):
+            sums.append(sums[-1] + powers[-1])
+            powers.append(powers[-1] @ self.block)
+        row, past, final = self.rows[:, :order] @ self.basis.columns, [], []
+        for p in self.groups:
+            past.append(row)
+            final.append(row @ powers[p - 1])
+            row = row @ powers[p]
+        first = np.array(past)
+        return first, np.array(final), first @ np.array([sums[p] for p in self.groups])
+
+    def _integrals(self, past: Array, totals: Array, weights: Array) -> Array:
+        """Weighted sums of ∫|past fold exp(flow (T - s)) sources| ds over a period, for each row of weights."""
+        total = np.zeros((len(weights), past.shape[1], self.sources.shape[1]))
+        counts = np.array(self.groups)
+        for count, chosen in ((FINE, slice(0, NEAR)), (COARSE, slice(NEAR, None))):
+            step = self._step(self.stack.period / count)
+            inward = self.basis.inverse @ self.one.fold
+            sizes, p = self.basis.of_rows(past[chosen]), counts[chosen, None, None]
+            for _ in range(count):
+                change = sizes @ self.basis.of_columns(self.step_back @ inward)
+                sloped = (np.abs(past[chosen] @ inward) + (p - 1) * change) @ step.slope
+                bound = p * (sloped + (p - 1) / 2 * (change @ step.size))
+                found = np.maximum(np.abs(totals[chosen] @ (inward @ step.area)), bound)
+                total += np.tensordot(weights[:, chosen], found, 1)
+                inward = inward @ step.forward
+        return total
+
+    def _discrete(self, past: Array, totals: Array, weights: Array, count: int) -> tuple[Array, Array]:
+        """Weighted sums of what acts at samples, and the largest of what starts; columns as in `acting`."""
+        p = np.array(self.groups)[:, None, None]
+        change = self.basis.of_rows(past) @ self.basis.of_columns(self.step_back @ self.acting)
+        summed = np.maximum(
+            np.abs(totals @ self.acting[:, :count]), p * (p - 1) / 2 * change[:, :, :count]
+        )  # fmt: skip
+        largest = np.abs(past @ self.acting[:, count:]) + (p - 1) * change[:, :, count:]
+        first = np.array([(largest * (weight / weight[0])[:, None, None]).max(axis=0) for weight in weights])
+        return np.tensordot(weights, summed, 1), first
+
+    def _current(self) -> Array:
+        """What acts in the period of the output, before it."""
+        steps, size = self.one.steps, self.outputs
+        count, parts = len(steps), [self._step(float(h)) for h in self.one.steps]
+        found = np.zeros((len(self.rows), self.sources.shape[1]))
+        for j in range(count):
+            rows = self.cx
+            for i in range(j, -1, -1):
+                piece = parts[i].integral(rows)
+                found[(count + j) * size : (count + j + 1) * size] += piece
+                if j + 1 < count:
+                    found[(j + 1) * size : (j + 2) * size] += piece
+                rows = rows @ parts[i].forward
+        return found
+
+    def _left(self, last: Array, growth: float, weight: float) -> tuple[Array, Array, Array]:
+        """Bounds on what comes after the groups: sums of sources and of what acts at samples; largest of what starts.
+
+        N^j x <= d for all j where x <= d and N d <= d.
+        """
+        basis, step = self.basis, self._step(self.stack.period / COARSE)
+        norms, last = growth * basis.norms, last * weight
+        reach = np.linalg.inv(np.eye(len(basis.blocks)) - norms)
+        inward, area = basis.inverse @ self.one.fold, 0.0
+        for _ in range(COARSE):
+            slopes = basis.of_columns(np.abs(inward) @ step.slope)
+            area = area + np.maximum(basis.of_columns(inward @ step.area), slopes)
+            inward = inward @ step.forward
+        acting = basis.of_columns(self.acting)
+        begun = acting + reach @ np.maximum(norms @ acting - acting, 0.0)
+        size = growth * last @ reach
+        return size @ area, size @ acting, last @ begun
+
+    def _between(self, values: Array, *, own: bool = False) -> Array:
+        """The largest value over all phases, from both ends of each sub-step, with the curvature between them."""
+        n, _, q = self.stack.sizes
+        size, count = self.outputs, len(self.one.steps)
+        early = values[: count * size].reshape(count, size, -1)
+        late = values[count * size : 2 * count * size].reshape(count, size, -1)
+        best = np.zeros((size, values.shape[1]))
+        bend = np.abs(self.cx @ self.flow)
+        for j, h in enumerate(self.one.steps):
+            speed = np.zeros((n + q, values.shape[1]))
+            speed[:n] = early[j, n : 2 * n]
+            if own:
+                speed += np.abs(self.sources)
+            curved = h**2 / 8 * (bend @ self._step(float(h)).ceiling @ speed)
+            best = np.maximum(best, np.maximum(early[j], late[j]) + curved)
+        return np.vstack([best, values[2 * count * size :]])

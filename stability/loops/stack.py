@@ -1,0 +1,264 @@
+"""One control period of the whole sampled loop: plant deviations, load networks and pending inputs as one exact map.
+
+    z' = a z + b v + ρ,   p_k' = φ*_k',   v = held + p,      Z = (z, c, pending inputs, newest first)
+
+inside a period, where p is what a demand moves since the last sample; z_i' gets φ*_j' where row i tracks a row j with
+a network. At a sample v_new = -K z - C c, c <- A c + G z - p, the pending inputs move on by one and by p. With a delay
+of so many whole periods and a share, the input switches from one pending value to the next at that share of a period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .box import DeviationRows
+from .deviation import networks
+from .model import Gains, LoopModel
+
+Array = NDArray[np.float64]
+
+#: A switch this close to a sample is at it, as a share of the period.
+AT_ONCE = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller:
+    """The discrete part of the loop in deviations.
+
+    Attributes:
+        feedback: K. Shape (m, n).
+        feedback_spread: Its radius.
+        network: C. Shape (m, q).
+        network_spread: Its radius.
+        entry: G. Shape (q, n).
+        entry_spread: Its radius.
+        keep: A. Shape (q, q).
+        keep_spread: Its radius.
+        start: z over (Q, c) where nothing has been adapted yet. Shape (n, n + q).
+    """
+
+    feedback: Array
+    feedback_spread: Array
+    network: Array
+    network_spread: Array
+    entry: Array
+    entry_spread: Array
+    keep: Array
+    keep_spread: Array
+    start: Array
+
+
+def controller(model: LoopModel, gains: tuple[Gains, ...], rows: DeviationRows, period: float) -> Controller:
+    """Q_i = z_i + b_j Q_j + c_j along the rows that track each other; v = -b Q - c; c <- c + T γ Q."""
+    governed, own = list(model.controlled), networks(model, gains)
+    n, q = len(model.rows), len(own)
+    middle, radius = (rows.half_low + rows.half_high) / 2, (rows.half_high - rows.half_low) / 2
+    found: dict[int, tuple[Array, Array]] = {}
+
+    def error(i: int) -> tuple[Array, Array]:
+        """Q_i over (z, c), and its radius."""
+        if i not in found:
+            value, spread, target = np.zeros(n + q), np.zeros(n + q), model.rows[i].target
+            value[i] = 1.0
+            if isinstance(target, int):
+                control, loose = action(target)
+                value, spread = value - control, spread + loose
+            found[i] = value, spread
+        return found[i]
+
+    def action(i: int) -> tuple[Array, Array]:
+        """κ_i less its operating value, over (z, c): -b_i Q_i - c_i; and its radius."""
+        value, spread = error(i)
+        g = governed.index(i)
+        control = -middle[g] * value
+        loose = radius[g] * (np.abs(value) + spread) + middle[g] * spread
+        if i in own:
+            control[n + own.index(i)] -= 1.0
+        return control, loose
+
+    actions = [action(row) for row in model.input_map]
+    rates = np.array([period * gains[governed.index(i)].gamma for i in own])
+    learned = [error(i) for i in own]
+    values = np.array([r * value for r, (value, _) in zip(rates, learned, strict=True)]).reshape(q, n + q)
+    spreads = np.array(
+        [r * ((1 + 2.0**-22) * s + 2.0**-22 * np.abs(v)) for r, (v, s) in zip(rates, learned, strict=True)]
+    ).reshape(q, n + q)
+    control, loose = (np.array([pair[k] for pair in actions]) for k in (0, 1))
+    return Controller(
+        feedback=-control[:, :n], feedback_spread=loose[:, :n], network=-control[:, n:], network_spread=loose[:, n:],
+        entry=values[:, :n], entry_spread=spreads[:, :n], keep=np.eye(q) + values[:, n:], keep_spread=spreads[:, n:],
+        start=_start(model, gains, own),
+    )  # fmt: skip
+
+
+def _start(model: LoopModel, gains: tuple[Gains, ...], own: list[int]) -> Array:
+    """z_i = Q_i - b_j Q_j - c_j with b = β/2; what rounding makes of it is left to the checker."""
+    n, governed = len(model.rows), list(model.controlled)
+    back = np.eye(n, n + len(own))
+    for i, row in enumerate(model.rows):
+        if isinstance(row.target, int):
+            back[i, row.target] = -gains[governed.index(row.target)].beta / 2
+            if row.target in own:
+                back[i, n + own.index(row.target)] = -1.0
+    return back
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stack:
+    """The loop of constant numbers.
+
+    Attributes:
+        a: Shape (n, n), rows divided by a middle inertia.
+        b: Shape (n, m).
+        steering: Which z_i' gets φ*_k'. Shape (n, q).
+        direct: Which input meets φ*_k. Shape (m, q).
+        control: The discrete part.
+        period: T, s.
+        whole: Whole periods of delay.
+        share: The rest of the delay as a share of the period, 0 or more and below 1.
+    """
+
+    a: Array
+    b: Array
+    steering: Array
+    direct: Array
+    control: Controller
+    period: float
+    whole: int
+    share: float
+
+    @property
+    def pending(self) -> int:
+        """Number of samples whose inputs are still to act."""
+        return self.whole + (self.share > 0)
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Numbers of plant states, inputs, and networks."""
+        return self.a.shape[0], self.b.shape[1], self.steering.shape[1]
+
+    @property
+    def order(self) -> int:
+        """Length of Z."""
+        n, m, q = self.sizes
+        return n + q + m * self.pending
+
+    def begin(self) -> Array:
+        """Z(0) over what it is made of: Q(0), c(0), measurement errors, and errors of the inputs.
+
+        The inputs that are pending at the start are the first that is computed. Shape (order, 2 n + q + m).
+        """
+        (n, m, q), ctl = self.sizes, self.control
+        made = np.zeros((self.order, 2 * n + q + m))
+        made[:n, : n + q], made[n : n + q, n : n + q] = ctl.start, np.eye(q)
+        first = np.hstack([-ctl.feedback @ ctl.start, -ctl.feedback, np.eye(m)])
+        first[:, n : n + q] -= ctl.network
+        made[n + q :] = np.tile(first, (self.pending, 1))
+        return made
+
+    def flow(self) -> Array:
+        """The matrix of (z, p)' = flow (z, p) + (b, 0) held."""
+        n, _, q = self.sizes
+        whole = np.zeros((n + q, n + q))
+        whole[:n, :n], whole[:n, n:] = self.a, self.b @ self.direct
+        return whole
+
+    def sources(self) -> Array:
+        """How ρ_1 … ρ_n and the rates φ*_1' … φ*_q' enter (z, p)'. Shape (n + q, n + q)."""
+        n, _, q = self.sizes
+        entry = np.eye(n + q)
+        entry[:n, n:] = self.steering
+        return entry
+
+
+def delay_of(delay: float, period: float) -> tuple[int, float]:
+    """Whole periods and the share of one that a delay takes."""
+    ratio = delay / period
+    whole = int(ratio + AT_ONCE)
+    share = ratio - whole
+    return whole, share if share > AT_ONCE else 0.0
+
+
+def wiring(model: LoopModel, own: Sequence[int]) -> tuple[Array, Array]:
+    """Which states follow the demand of each network, and which inputs do. Shapes (n, q), (m, q)."""
+    steering = np.array([[float(row.target == i) for i in own] for row in model.rows]).reshape(len(model.rows), -1)
+    direct = np.array([[float(row == i) for i in own] for row in model.input_map]).reshape(len(model.input_map), -1)
+    return steering, direct
+
+
+@dataclass(frozen=True, kw_only=True)
+class Turn:
+    """A period of a stack on a grid of sub-steps that holds the switch of the input.
+
+    Columns are over Z, then pulses on the new inputs, pulses on the networks, and measurement errors of the states.
+
+    Attributes:
+        steps: Length of each sub-step, s.
+        begin: (z, p) at the start of each sub-step, and at the end of the last. Shape (steps + 1, n + q, columns).
+        held: The input that acts in each sub-step. Shape (steps, m, columns).
+        image: Z at the next sample. Shape (order, columns).
+        fold: How (z, p) at the end of a period enters Z. Shape (order, n + q).
+    """
+
+    steps: Array
+    begin: Array
+    held: Array
+    image: Array
+    fold: Array
+
+
+def turn(stack: Stack, count: int) -> Turn:
+    """The exact maps of a period with about so many sub-steps."""
+    from scipy.linalg import expm
+
+    n, m, q = stack.sizes
+    order, waiting, ctl = stack.order, stack.pending, stack.control
+    columns = order + m + q + n
+    pulse, learn, noise = slice(order, order + m), slice(order + m, order + m + q), slice(order + m + q, columns)
+    fresh = np.zeros((m, columns))
+    fresh[:, :n], fresh[:, n : n + q], fresh[:, pulse] = -ctl.feedback, -ctl.network, np.eye(m)
+    fresh[:, noise] = -ctl.feedback
+
+    def waited(k: int) -> Array:
+        """The input computed k samples ago."""
+        if k == 0:
+            return fresh
+        held = np.zeros((m, columns))
+        held[:, n + q + m * (k - 1) : n + q + m * k] = np.eye(m)
+        return held
+
+    parts = [(stack.share, waited(stack.whole + 1))] if stack.share > 0 else []
+    parts.append((1 - stack.share, waited(stack.whole)))
+    flow = stack.flow()
+    block = np.zeros((n + q + m, n + q + m))
+    block[: n + q, : n + q], block[:n, n + q :] = flow, stack.b
+    x = np.eye(n + q, columns)
+    x[n:] = 0.0
+    steps, begin, acting = [], [x], []
+    for share, held in parts:
+        pieces = max(1, round(count * share))
+        length = share * stack.period / pieces
+        forward = np.asarray(expm(block * length))
+        for _ in range(pieces):
+            x = forward[: n + q, : n + q] @ x + forward[: n + q, n + q :] @ held
+            steps.append(length)
+            begin.append(x)
+            acting.append(held)
+    fold = np.zeros((order, n + q))
+    fold[:n, :n] = np.eye(n)
+    fold[n : n + q, n:] = -np.eye(q)
+    for k in range(waiting):
+        fold[n + q + m * k : n + q + m * (k + 1), n:] = stack.direct
+    image = fold @ x
+    kept = image[n : n + q]
+    kept[:, :n] += ctl.entry
+    kept[:, n : n + q] += ctl.keep
+    kept[:, learn] += np.eye(q)
+    kept[:, noise] += ctl.entry
+    for k in range(waiting):
+        image[n + q + m * k : n + q + m * (k + 1)] += waited(k)
+    return Turn(steps=np.array(steps), begin=np.array(begin), held=np.array(acting), image=image, fold=fold)
