@@ -21,6 +21,22 @@ def emla(name):
     return load(name).model_dump(mode="json", exclude_none=True)
 
 
+def proportional():
+    """emla-p2 at once and without a load network: eight searched gains, a load of any course, larger initial errors."""
+    data = emla("emla-p2")
+    data["controller"]["delay_s"] = 0.0
+    data["controller"]["gains"] = {
+        **{f"beta_{k}": {"min": low, "max": high} for k, low, high in ((1, 8.0, 60.0), (2, 1500.0, 15000.0))},
+        **{f"epsilon_{k}": {"min": 1.0, "max": high} for k, high in ((1, 1000.0), (2, 1500.0))},
+        **{f"delta_{k}": {"min": 0.1, "max": 10.0} for k in (1, 2)},
+        **{f"sigma_{k}": {"min": 1.0, "max": 50.0} for k in (1, 2)},
+    }
+    data["uncertainty"]["disturbances"]["load_force"].pop("rate")
+    data["uncertainty"]["initial"] = {"position_m": 1e-4, "speed_m_s": 3e-3, "torque_nm": 12.0}
+    data["tuning"] |= {"population": 20, "iterations": 20, "weights": {}}
+    return data
+
+
 def quick_arm(**changes):
     """The study arm-p3, short: one move there and back, faults after 3 s, no search."""
     data = bundled("arm-p3")

@@ -173,16 +173,6 @@ def tube_of(own: Subsystem, found: Impulse) -> Tube:
     )
 
 
-def refined(name: str, own: Subsystem, contract: Contract) -> Contract:
-    """The contract with a refined certificate, where that bounds the error more tightly and keeps the guarantee."""
-    better = prove(name, own, contract.bounds, refine=True)
-    if isinstance(better, Failure) or not better.certificate.ultimate[0] < contract.certificate.ultimate[0]:
-        return contract
-    assert contract.guarantee is not None and better.reached is not None
-    kept = contract.guarantee.holds(better.reached)
-    return replace(better, guarantee=contract.guarantee) if kept else contract
-
-
 def guarantees(contracts: Mapping[str, Contract]) -> dict[str, Tube]:
     """The guarantees by member.
 

@@ -2,6 +2,7 @@ import json
 from dataclasses import replace
 
 import pytest
+from machines import proportional
 
 from hdmm_opt import study
 from hdmm_opt.cli import falsify as verb
@@ -16,7 +17,7 @@ from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop, scenarios
 from stability import checker
 
-GAINS = {"actuator": (24.0, 0.0, 1.0, 1.0, 6000.0, 0.0, 1.0, 1.0)}
+GAINS = {"actuator": (24.0, 0.0, 1.0, 1.0, *[0.0] * 3, 6000.0, 0.0, 1.0, 1.0, *[0.0] * 3)}
 
 
 def quiet(share, text):
@@ -25,7 +26,7 @@ def quiet(share, text):
 
 @pytest.fixture(scope="module")
 def loop():
-    return Loop(assemble(study.load("emla-p2")))
+    return Loop(assemble(study.validated(proportional(), "test")))
 
 
 def test_finds_the_static_worst_case_of_an_overdamped_loop(loop):
