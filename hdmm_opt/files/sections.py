@@ -25,7 +25,7 @@ DIGITS = 9
 ROOM = 1 + 1e-6
 #: Room of a stated bound on a member's error, and on the output's, over what was found: the checker rounds outwards.
 ULTIMATE, OUTPUT = 5e-4, 6e-4
-#: Share of a rate of decay that a file states: the checker's logarithm is rounded down.
+#: Share of a rate of decay that a file states.
 RATE = 0.999
 
 
@@ -110,12 +110,18 @@ def certificate_data(contract: Contract) -> dict[str, Any]:
             for cell in found.cells
         ],
         "envelope": {
-            "rate": short(RATE * found.decay), "ultimate": [short(v * (1 + ULTIMATE), up=True) for v in found.ultimate]
+            "rate": short(_rate(contract)), "ultimate": [short(v * (1 + ULTIMATE), up=True) for v in found.ultimate]
         },
     }  # fmt: skip
     if contract.guarantee is not None:
         data["guarantee"] = _tube(contract.guarantee)
     return data
+
+
+def _rate(contract: Contract) -> float:
+    """The rate at which what a start makes shrinks, 1/s, from below: ln g >= 2 (g - 1)/(g + 1)."""
+    least = min(cell.growth for cell in contract.certificate.cells)
+    return RATE * 2 * (least - 1) / (least + 1) / contract.bounds.period
 
 
 def _matrix(rows: np.ndarray) -> list[list[str]]:

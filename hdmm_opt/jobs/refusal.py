@@ -18,10 +18,13 @@ from ..problem.margins import Margin, margins, member_margins
 from ..problem.problem import Contracts
 from ..problem.verdict import Verdict
 from ..simulation import Figures, Loop, Run, Scenario, scenarios, within_assumptions
-from .certify import composition, longest_period
+from .certify import certificate, composition, longest_period
 from .demand import demand_period, largest_demand, resting_demand, terms_that_help
 from .shrinking import uncertainty
 from .validation import shown_scenarios
+
+#: A law at so many times its rate counts as continuous.
+FASTER = 32
 
 
 def refused(problem: Problem, loop: Loop, gains: GainSet, contracts: Contracts | Failure) -> Design:
@@ -73,6 +76,8 @@ def _alone(problem: Problem, gains: GainSet) -> list[Verdict]:
     for member in problem.members:
         own = member.under(still[member.name])
         values = gains[member.name]
+        if not isinstance(certificate(_faster(own), values), Failure):
+            continue  # what fails is not the law, but its rate
         continuous = composition(own, values)
         if isinstance(continuous, Certificate) and any(g.gamma > 0 for g in own.gains(values)):
             continue  # it is of the law without load networks: what it bounds is not what this one does
@@ -80,6 +85,11 @@ def _alone(problem: Problem, gains: GainSet) -> list[Verdict]:
         if found:
             return [replace(v, member=member.name if several else "") for v in found]
     return []
+
+
+def _faster(member: Member) -> Member:
+    """The member with a law that is nearly continuous."""
+    return member.under(replace(member.bounds, period=member.bounds.period / FASTER, delay=0.0))
 
 
 def _broken(margin: Margin) -> Verdict:

@@ -107,7 +107,7 @@ def test_committed_files_meet_what_their_studies_ask():
         assert rows["tracking_error_m"]["certified"] <= error
         assert all(row["simulated"] <= row["required"] for row in rows.values())
     data = read(GAINS / "emla-p2.gains.json")
-    assert 1.0 <= certified_of(data) / data["validation"]["largest_error_after_transient_m"] <= 2.0
+    assert 1.0 <= certified_of(data) / data["validation"]["largest_error_after_transient_m"] <= 3.0
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_simulate_prints_figures_and_writes_signals(tmp_path):
     assert 0 < figures["maximum_error_m"] < 2e-3
     rows = list(csv.DictReader(io.StringIO((tmp_path / "out.csv").read_text(encoding="utf-8"))))
     late = [abs(float(row["error [m]"])) for row in rows if float(row["time [s]"]) >= 1.0]
-    assert max(late) == pytest.approx(figures["maximum_error_m"])
+    assert max(late) == pytest.approx(figures["maximum_error_m"], abs=5e-12)  # twelve digits are written
     assert run("simulate", source, "--scenario", "heavvy").stderr.count("\n") == 1
     assert run("simulate", source, "--csv", tmp_path / "x.csv").returncode == 2
     assert run("simulate", source, "--scenario", "worst-case").returncode == 0
@@ -290,7 +290,7 @@ def test_junit_lists_every_obligation(tmp_path, gain_text):
     (tmp_path / "cut.json").write_text(gain_text[:500], encoding="utf-8")
     assert run("check", "good.json", "cut.json", "--junit", "out.xml", cwd=tmp_path).returncode == 2
     suites = {s.get("name"): s for s in ElementTree.parse(tmp_path / "out.xml").getroot()}
-    assert int(suites["good.json"].get("tests")) == 1 + len(checker.REQUIRED["rac"]["sampled"])
+    assert int(suites["good.json"].get("tests")) == 1 + len(checker.REQUIRED["rac"]["impulse"])
     assert suites["good.json"].get("failures") == suites["good.json"].get("errors") == "0"
     assert suites["cut.json"].get("errors") == "1" and suites["cut.json"].find("testcase/error") is not None
 
@@ -300,9 +300,9 @@ pytest_plugins = ["pytester"]
 
 def test_pytest_collects_gain_files(pytester, document, resealed):
     pytester.makefile(".gains.json", good=resealed(document))
-    document["study"]["requirements"]["tracking_error_m"] = 1e-4
+    document["study"]["requirements"]["tracking_error_m"] = 1e-5
     pytester.makefile(".gains.json", bad=resealed(document))
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "-n0")
-    count = len(checker.REQUIRED["rac"]["sampled"])
-    result.assert_outcomes(passed=count + 1 + count - 2, failed=3)
+    count = len(checker.REQUIRED["rac"]["impulse"])
+    result.assert_outcomes(passed=count + 1 + count - 1, failed=2)
     result.stdout.fnmatch_lines(["*undecided: actuator: accuracy*"])
