@@ -15,7 +15,7 @@ from hdmm_opt.files.read import read
 from hdmm_opt.files.restore import restored
 from hdmm_opt.problem import GainSet, Problem, assemble
 from hdmm_opt.simulation import Loop, Run, Scenario
-from stability import Certificate, Gains, certify, certify_sampled, checker
+from stability import Certificate, Gains, certify, certify_impulse, checker
 from stability.certificates.quadratic import Inclusion, prove, search
 from stability.networks.contracts import Assume, Subsystem, replaced, solve_contracts
 from stability.networks.springs import Coupling, coupled
@@ -141,8 +141,8 @@ def alone(name: str, problem: Problem, gains: GainSet) -> list[tuple[str, float]
     values = gains[member.name]
     arguments = (member.model, member.bounds, member.gains(values), member.box)
     makers: list[tuple[str, Callable[[], object]]] = [
-        ("sampled", lambda: certify_sampled(*arguments)),
-        ("sampled, refined", lambda: certify_sampled(*arguments, refine=True)),
+        ("impulse", lambda: certify_impulse(*arguments)),
+        ("impulse, refined", lambda: certify_impulse(*arguments, refine=True)),
         ("composition", lambda: composition(member, values)),
     ]
     rows = []
