@@ -368,6 +368,14 @@ def plus(*forms: Form) -> Form:
     return result
 
 
+def over(form: Form, ranges: dict[str, Interval]) -> Interval:
+    """Range of a form over ranges of its symbols."""
+    total = ZERO
+    for symbol, value in form.items():
+        total = add(total, mul(value, ranges[symbol]))
+    return total
+
+
 def times(form: Form, factor: Interval) -> Form:
     """A form scaled by an interval."""
     return {symbol: mul(value, factor) for symbol, value in form.items()}
@@ -397,10 +405,7 @@ class Table:
 
     def over(self, form: Form) -> Interval:
         """Range of a form."""
-        total = ZERO
-        for symbol, value in form.items():
-            total = add(total, mul(value, self.ranges[symbol]))
-        return total
+        return over(form, self.ranges)
 
     def node(self, key: int, form: Form, natural: Interval) -> Node:
         """A value whose range is the better of two enclosures."""
@@ -2135,7 +2140,7 @@ class Loop:
         met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[i])))
         middle = {"": (claim.middle[place], claim.middle[place])}
         level = table.over(plus(met, middle))
-        change = max((abs(end) for end in table_sum(met, changes)), default=Fraction(0))
+        change = magnitude(over(met, changes))
         drive, constant = neg(raw.get(f"p{i}", ZERO)), True
         if not drive[0] > 0:
             drive, constant = neg(self.closed[i].get(f"p{i}", ZERO)), False
@@ -2154,7 +2159,7 @@ class Loop:
                         {"": symmetric(around * magnitude(mul(level, inverse(drive))))})  # fmt: skip
         left = magnitude(self._left(rest))
         self.demand.append(mul(level, inverse(drive)))
-        still = table_sum(plus(met, middle), {**table.ranges, **self.resting})
+        still = over(plus(met, middle), {**table.ranges, **self.resting})
         self.resting[f"p{i}"] = mul(still, inverse(drive))
         self.demand_rate.append(up(change / drive[0]))
         self.settled.append(up(left / least))
@@ -2169,13 +2174,6 @@ class Loop:
         change = magnitude(self.table.over(self.virtual[self.claim.input_map[k]]))
         return (self.claim.period + self.claim.delay) * change
 
-    def signal(self, name: str) -> Fraction:
-        """Bound on |input| as commanded, or on |state|."""
-        if name not in self.claim.inputs:
-            return magnitude(self.nodes[name].range)
-        k = self.claim.inputs.index(name)
-        return magnitude(self.table.over(self._kappa(self.claim.input_map[k]))) + self.claim.input_bound[k]
-
     def size(self, name: str, deviations: list[Fraction], *, resting: bool) -> Fraction:
         """Bound on |input| as commanded, or on |state|, for bounds on |z| and |v|, in motion or at rest at first."""
         claim, n = self.claim, len(self.claim.rows)
@@ -2183,17 +2181,9 @@ class Loop:
         known |= {f"Q{i}": symmetric(r) for i, r in enumerate(deviations[:n])}
         if name in claim.inputs:
             k = claim.inputs.index(name)
-            return magnitude(table_sum(self._kappa(claim.input_map[k]), known)) + deviations[n + k]
+            return magnitude(over(self._kappa(claim.input_map[k]), known)) + deviations[n + k]
         i = next(i for i, row in enumerate(claim.rows) if row["state"] == name)
-        return magnitude(table_sum(self._target(i), known)) + deviations[i]
-
-
-def table_sum(form: Form, ranges: dict[str, Interval]) -> Interval:
-    """Range of a form over given ranges of its symbols."""
-    total = ZERO
-    for symbol, value in form.items():
-        total = add(total, mul(value, ranges[symbol]))
-    return total
+        return magnitude(over(self._target(i), known)) + deviations[i]
 
 
 # --- matrices ---
@@ -2338,6 +2328,7 @@ class Turn:
         self.n, self.m, self.q = len(claim.rows), len(claim.inputs), len(claim.networks)
         self.order = self.n + self.q + self.m * claim.pending
         self.width = self.m + self.q + self.n
+        self.columns = self.order + self.width
         self._plant(masses)
         self._controller()
         self._flow()
@@ -2430,7 +2421,7 @@ class Turn:
     def held(self, k: int) -> Ball:
         """The input computed k samples ago, over the columns."""
         n, m, q, order = self.n, self.m, self.q, self.order
-        rows = [[Fraction(0)] * (order + m + q + n) for _ in range(m)]
+        rows = [[Fraction(0)] * self.columns for _ in range(m)]
         for i, row in enumerate(rows):
             if k:
                 row[n + q + m * (k - 1) + i] = Fraction(1)
@@ -2446,8 +2437,7 @@ class Turn:
         parts.append((1 - claim.share, self.held(claim.whole)))
         whole = [[*row, *(self.b[i] if i < n else [Fraction(0)] * m)] for i, row in enumerate(self.flow)]
         whole += [[Fraction(0)] * (n + q + m) for _ in range(m)]
-        x = Ball([[int(i == j and i < n) * eye(1).rows[0][0] for j in range(self.order + m + q + n)]
-                  for i in range(n + q)], 0)  # fmt: skip
+        x = Ball([[int(i == j and i < n) << FIXED for j in range(self.columns)] for i in range(n + q)], 0)
         self.steps: list[Fraction] = []
         self.ends: list[tuple[Ball, Ball, Ball]] = []
         for share, acting in parts:
@@ -2469,7 +2459,7 @@ class Turn:
         """Z at the next sample over the columns; how (z, p) at the end of a period enters it; what Z(0) is made of."""
         claim, n, m, q, order = self.claim, self.n, self.m, self.q, self.order
         fold = [[Fraction(0)] * (n + q) for _ in range(order)]
-        kept = [[Fraction(0)] * (order + m + q + n) for _ in range(order)]
+        kept = [[Fraction(0)] * self.columns for _ in range(order)]
         for i in range(n):
             fold[i][i] = Fraction(1)
         for j in range(q):
@@ -2510,15 +2500,11 @@ class Turn:
             (low, high), preload = claim.demand[j], self.loop.gain[i].preload
             away = max(abs(preload - low), abs(high - preload)) + ROUNDING * abs(preload)
             first.append(up(max(away, self.loop.settled[j]) / claim.network_bound[j]))
-        loose = [sum((s * v for s, v in zip(row, first, strict=True)), Fraction(0)) for row in self.start_spread]
-        size = [sum((abs(s) * v for s, v in zip(row, first, strict=True)), Fraction(0)) for row in self.start]
+        loose = [dot(row, first) for row in self.start_spread]
+        size = [dot(map(abs, row), first) for row in self.start]
         unsure = [up(v) for v in loose] + [Fraction(0)] * q
         felt = [z + w + noise for z, w, noise in zip(size, loose, self.noise, strict=True)] + first[n:]
-        held = [
-            up(sum((abs(v) * w for v, w in zip(self.act[k][:n], loose, strict=True)), Fraction(0))
-               + sum((s * v for s, v in zip(self.act_spread[k], felt, strict=True)), Fraction(0)))
-            for k in range(self.m)
-        ]  # fmt: skip
+        held = [up(dot(map(abs, self.act[k][:n]), loose) + dot(self.act_spread[k], felt)) for k in range(self.m)]
         return [*first, *self.noise, *self.blur], unsure + held * claim.pending
 
 
@@ -2701,9 +2687,8 @@ class Responses:
                     made.append(self.cx @ x + entry @ acting)
                 ends.append(index[key])
             self.pairs.append((ends[0], ends[1]))
-        width = turn.order + m + q + n
         rows = [row for part in made for row in part.rows]
-        chosen = [[int(c == n + j) << FIXED for c in range(width)] for j in range(q)]
+        chosen = [[int(c == n + j) << FIXED for c in range(turn.columns)] for j in range(q)]
         self.rows = Ball([*rows, *chosen], max(part.error for part in made))
 
     def _groups(self) -> None:
@@ -3338,7 +3323,8 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Impulse]:
     loop = Loop(claim, ROUNDING)
     verdict = Impulse(claim, loop)
     ranges = {row["state"]: loop.nodes[row["state"]].range for row in claim.rows}
-    ranges |= {name: (-loop.signal(name), loop.signal(name)) for name in claim.inputs}
+    box = [*claim.half_widths, *claim.input_bound]
+    ranges |= {name: symmetric(loop.size(name, box, resting=False)) for name in claim.inputs}
     effects = effects_of(claim, ranges)
     spare = {name: v / (LEAST_LOAD if name in claim.disturbances else LEAST_EFFECT) for name, v in effects.items()}
     weakest = min(spare, key=spare.__getitem__, default="")

@@ -129,9 +129,7 @@ class Batches:
             x[part.x] = own
             discrete = part.discrete(z)
             discrete["law"][:] = np.reshape(
-                np.array(
-                    [part.law.start(*map(np.ndarray.tolist, pair)) for pair in zip(own.T, gains.T, strict=True)]
-                ).T,
+                np.array([part.law.start(x0.tolist(), g.tolist()) for x0, g in zip(own.T, gains.T, strict=True)]).T,
                 (part.law.states, lanes),
             )
             if part.waiting:

@@ -27,7 +27,7 @@ from ..loops.box import Box, DeviationRows, UnboundedError
 from ..loops.deviation import NOTHING, deviation_rows, first_box, networks, rounded
 from ..loops.model import Bounds, Gains, LoopModel
 from ..loops.responses import Responses, responses
-from ..loops.stack import Stack, controller, delay_of, wiring
+from ..loops.stack import Stack, controller, delay_of, turn, wiring
 from .certificate import Certificate, Failure
 from .small_gain import COARSE, FINE, Cell, Cut, cell_of, cells_of, closed, late_of, middle_of, small_gain
 
@@ -218,13 +218,11 @@ class Search:
         n, m = len(self.limit), len(self.model.inputs)
         settled = _after(solved, periods_in(bounds.transient, bounds.period))
         whole = np.concatenate([box.half_widths, box.input_bound])
-        moving = whole
+        sizes = rows.sizes(whole, resting=False)
         if bounds.rest[1] > 0:  # what a start makes of the loop has shrunk when the motion begins
             late = _after(solved, periods_in(bounds.rest[1], bounds.period))
             moving = np.minimum(whole, np.concatenate([late[:n], late[2 * n : 2 * n + m] + late_of(rows, bounds)]))
-        sizes = rows.sizes(moving, resting=False)
-        if bounds.rest[1] > 0:
-            sizes = np.maximum(sizes, rows.sizes(whole, resting=True))
+            sizes = np.maximum(rows.sizes(moving, resting=False), rows.sizes(whole, resting=True))
         decay = min(math.log(s.growth) for s in solved) / bounds.period
         return Impulse(
             decay=decay, half_widths=box.half_widths, input_bound=box.input_bound, ultimate=settled[:n],
@@ -238,8 +236,6 @@ class Search:
 
     def _unstable(self, bounds: Bounds) -> Failure:
         """Why a loop has no summable responses."""
-        from ..loops.stack import turn
-
         part = cells_of(self.rows, self.split)[next(i for i, r in enumerate(self.responses) if r is None)]
         stack = self._stack(part, bounds)
         poles = np.linalg.eigvals(turn(stack, 1).image[:, : stack.order])

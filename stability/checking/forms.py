@@ -26,6 +26,14 @@ def plus(*forms: Form) -> Form:
     return result
 
 
+def over(form: Form, ranges: dict[str, Interval]) -> Interval:
+    """Range of a form over ranges of its symbols."""
+    total = ZERO
+    for symbol, value in form.items():
+        total = add(total, mul(value, ranges[symbol]))
+    return total
+
+
 def times(form: Form, factor: Interval) -> Form:
     """A form scaled by an interval."""
     return {symbol: mul(value, factor) for symbol, value in form.items()}
@@ -55,10 +63,7 @@ class Table:
 
     def over(self, form: Form) -> Interval:
         """Range of a form."""
-        total = ZERO
-        for symbol, value in form.items():
-            total = add(total, mul(value, self.ranges[symbol]))
-        return total
+        return over(form, self.ranges)
 
     def node(self, key: int, form: Form, natural: Interval) -> Node:
         """A value whose range is the better of two enclosures."""

@@ -10,7 +10,7 @@ from fractions import Fraction
 
 from .arithmetic import ONE, ZERO, Interval, add, down, inverse, magnitude, mul, neg, symmetric, up
 from .claim import Claim, Gain
-from .forms import Form, Node, Table, derivative, linear, plus, times
+from .forms import Form, Node, Table, derivative, linear, over, plus, times
 from .limits import VARYING, NotProvedError, need
 from .parsing import reads
 
@@ -176,7 +176,7 @@ class Loop:
         met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[i])))
         middle = {"": (claim.middle[place], claim.middle[place])}
         level = table.over(plus(met, middle))
-        change = max((abs(end) for end in table_sum(met, changes)), default=Fraction(0))
+        change = magnitude(over(met, changes))
         drive, constant = neg(raw.get(f"p{i}", ZERO)), True
         if not drive[0] > 0:
             drive, constant = neg(self.closed[i].get(f"p{i}", ZERO)), False
@@ -195,7 +195,7 @@ class Loop:
                         {"": symmetric(around * magnitude(mul(level, inverse(drive))))})  # fmt: skip
         left = magnitude(self._left(rest))
         self.demand.append(mul(level, inverse(drive)))
-        still = table_sum(plus(met, middle), {**table.ranges, **self.resting})
+        still = over(plus(met, middle), {**table.ranges, **self.resting})
         self.resting[f"p{i}"] = mul(still, inverse(drive))
         self.demand_rate.append(up(change / drive[0]))
         self.settled.append(up(left / least))
@@ -210,13 +210,6 @@ class Loop:
         change = magnitude(self.table.over(self.virtual[self.claim.input_map[k]]))
         return (self.claim.period + self.claim.delay) * change
 
-    def signal(self, name: str) -> Fraction:
-        """Bound on |input| as commanded, or on |state|."""
-        if name not in self.claim.inputs:
-            return magnitude(self.nodes[name].range)
-        k = self.claim.inputs.index(name)
-        return magnitude(self.table.over(self._kappa(self.claim.input_map[k]))) + self.claim.input_bound[k]
-
     def size(self, name: str, deviations: list[Fraction], *, resting: bool) -> Fraction:
         """Bound on |input| as commanded, or on |state|, for bounds on |z| and |v|, in motion or at rest at first."""
         claim, n = self.claim, len(self.claim.rows)
@@ -224,14 +217,6 @@ class Loop:
         known |= {f"Q{i}": symmetric(r) for i, r in enumerate(deviations[:n])}
         if name in claim.inputs:
             k = claim.inputs.index(name)
-            return magnitude(table_sum(self._kappa(claim.input_map[k]), known)) + deviations[n + k]
+            return magnitude(over(self._kappa(claim.input_map[k]), known)) + deviations[n + k]
         i = next(i for i, row in enumerate(claim.rows) if row["state"] == name)
-        return magnitude(table_sum(self._target(i), known)) + deviations[i]
-
-
-def table_sum(form: Form, ranges: dict[str, Interval]) -> Interval:
-    """Range of a form over given ranges of its symbols."""
-    total = ZERO
-    for symbol, value in form.items():
-        total = add(total, mul(value, ranges[symbol]))
-    return total
+        return magnitude(over(self._target(i), known)) + deviations[i]

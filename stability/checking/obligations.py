@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from .arithmetic import root, up
+from .arithmetic import root, symmetric, up
 from .claim import Claim
 from .effects import effects_of
 from .impulse import Impulse
@@ -64,7 +64,8 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Impulse]:
     loop = Loop(claim, ROUNDING)
     verdict = Impulse(claim, loop)
     ranges = {row["state"]: loop.nodes[row["state"]].range for row in claim.rows}
-    ranges |= {name: (-loop.signal(name), loop.signal(name)) for name in claim.inputs}
+    box = [*claim.half_widths, *claim.input_bound]
+    ranges |= {name: symmetric(loop.size(name, box, resting=False)) for name in claim.inputs}
     effects = effects_of(claim, ranges)
     spare = {name: v / (LEAST_LOAD if name in claim.disturbances else LEAST_EFFECT) for name, v in effects.items()}
     weakest = min(spare, key=spare.__getitem__, default="")

@@ -101,9 +101,8 @@ class Responses:
                     made.append(self.cx @ x + entry @ acting)
                 ends.append(index[key])
             self.pairs.append((ends[0], ends[1]))
-        width = turn.order + m + q + n
         rows = [row for part in made for row in part.rows]
-        chosen = [[int(c == n + j) << FIXED for c in range(width)] for j in range(q)]
+        chosen = [[int(c == n + j) << FIXED for c in range(turn.columns)] for j in range(q)]
         self.rows = Ball([*rows, *chosen], max(part.error for part in made))
 
     def _groups(self) -> None:

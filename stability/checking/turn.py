@@ -9,9 +9,9 @@ from fractions import Fraction
 
 from .arithmetic import ZERO, Interval, add, down, mul, neg, up
 from .claim import Claim
-from .limits import ROUNDING
+from .limits import FIXED, ROUNDING
 from .loop import Loop
-from .matrices import Ball, Matrix, ball, exponential_of, eye
+from .matrices import Ball, Matrix, ball, dot, exponential_of
 
 #: Sub-steps of a period for outputs.
 PHASES = 4
@@ -37,6 +37,7 @@ class Turn:
         self.n, self.m, self.q = len(claim.rows), len(claim.inputs), len(claim.networks)
         self.order = self.n + self.q + self.m * claim.pending
         self.width = self.m + self.q + self.n
+        self.columns = self.order + self.width
         self._plant(masses)
         self._controller()
         self._flow()
@@ -129,7 +130,7 @@ class Turn:
     def held(self, k: int) -> Ball:
         """The input computed k samples ago, over the columns."""
         n, m, q, order = self.n, self.m, self.q, self.order
-        rows = [[Fraction(0)] * (order + m + q + n) for _ in range(m)]
+        rows = [[Fraction(0)] * self.columns for _ in range(m)]
         for i, row in enumerate(rows):
             if k:
                 row[n + q + m * (k - 1) + i] = Fraction(1)
@@ -145,8 +146,7 @@ class Turn:
         parts.append((1 - claim.share, self.held(claim.whole)))
         whole = [[*row, *(self.b[i] if i < n else [Fraction(0)] * m)] for i, row in enumerate(self.flow)]
         whole += [[Fraction(0)] * (n + q + m) for _ in range(m)]
-        x = Ball([[int(i == j and i < n) * eye(1).rows[0][0] for j in range(self.order + m + q + n)]
-                  for i in range(n + q)], 0)  # fmt: skip
+        x = Ball([[int(i == j and i < n) << FIXED for j in range(self.columns)] for i in range(n + q)], 0)
         self.steps: list[Fraction] = []
         self.ends: list[tuple[Ball, Ball, Ball]] = []
         for share, acting in parts:
@@ -168,7 +168,7 @@ class Turn:
         """Z at the next sample over the columns; how (z, p) at the end of a period enters it; what Z(0) is made of."""
         claim, n, m, q, order = self.claim, self.n, self.m, self.q, self.order
         fold = [[Fraction(0)] * (n + q) for _ in range(order)]
-        kept = [[Fraction(0)] * (order + m + q + n) for _ in range(order)]
+        kept = [[Fraction(0)] * self.columns for _ in range(order)]
         for i in range(n):
             fold[i][i] = Fraction(1)
         for j in range(q):
@@ -209,15 +209,11 @@ class Turn:
             (low, high), preload = claim.demand[j], self.loop.gain[i].preload
             away = max(abs(preload - low), abs(high - preload)) + ROUNDING * abs(preload)
             first.append(up(max(away, self.loop.settled[j]) / claim.network_bound[j]))
-        loose = [sum((s * v for s, v in zip(row, first, strict=True)), Fraction(0)) for row in self.start_spread]
-        size = [sum((abs(s) * v for s, v in zip(row, first, strict=True)), Fraction(0)) for row in self.start]
+        loose = [dot(row, first) for row in self.start_spread]
+        size = [dot(map(abs, row), first) for row in self.start]
         unsure = [up(v) for v in loose] + [Fraction(0)] * q
         felt = [z + w + noise for z, w, noise in zip(size, loose, self.noise, strict=True)] + first[n:]
-        held = [
-            up(sum((abs(v) * w for v, w in zip(self.act[k][:n], loose, strict=True)), Fraction(0))
-               + sum((s * v for s, v in zip(self.act_spread[k], felt, strict=True)), Fraction(0)))
-            for k in range(self.m)
-        ]  # fmt: skip
+        held = [up(dot(map(abs, self.act[k][:n]), loose) + dot(self.act_spread[k], felt)) for k in range(self.m)]
         return [*first, *self.noise, *self.blur], unsure + held * claim.pending
 
 

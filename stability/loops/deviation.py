@@ -55,11 +55,14 @@ def first_box(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], half_w
     )  # fmt: skip
     for _ in range(3 if len(capacity) else 0):
         rows = deviation_rows(model, bounds, gains, box)
-        low, high = rows.demand.T
-        room = 1e-6 * np.maximum(np.abs(low), np.abs(high))
         # what is left leans to a side until its middle is met too
-        box = replace(box, low=low - room, high=high + room, middle=rounded(box.middle + rows.lean))
-    low, high = deviation_rows(model, bounds, gains, box).demand.T
+        box = replace(_demanding(box, rows), middle=rounded(box.middle + rows.lean))
+    return _demanding(box, deviation_rows(model, bounds, gains, box))
+
+
+def _demanding(box: Box, rows: DeviationRows) -> Box:
+    """The box with the demands of these rows, and a little room."""
+    low, high = rows.demand.T
     room = 1e-6 * np.maximum(np.abs(low), np.abs(high))
     return replace(box, low=low - room, high=high + room)
 
@@ -99,14 +102,15 @@ def deviation_rows(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], b
         raise UnboundedError(f"the model cannot be bounded over the box: {error}") from error
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Demand:
-    """What a network has to meet: range and rate of φ*, and the row's disturbance that is left."""
+    """What a network has to meet: range and rate of φ*, and the row's disturbance that is left, also as a part of φ̂."""
 
     range: Interval
     rate: float
     rest: float
     lean: float
+    settled: float
     resting: Interval
 
 
@@ -167,7 +171,7 @@ class _Builder(Builder):
             ranges=(dict(self.symbols.ranges), self._resting() | {f"p{i}": d.resting for i, d in demands.items()}),
             demand=np.array([[d.range.low, d.range.high] for d in demands.values()]).reshape(-1, 2),
             demand_rate=np.array([d.rate for d in demands.values()]),
-            settled=np.array([d.rest / self._drive(i, raw[i], rows[i])[0].low for i, d in demands.items()]),
+            settled=np.array([d.settled for d in demands.values()]),
             lean=np.array([d.lean for d in demands.values()]),
         )  # fmt: skip
 
@@ -189,7 +193,7 @@ class _Builder(Builder):
         middle = Form(constant=Interval(float(self.box.middle[self.networks.index(i)])))
         level = self.symbols.range_of(met + middle)
         change = total(c * rates[s] for s, c in met.coefficients.items()).magnitude
-        rest = rest - late.scaled(mass) - middle
+        rest, least = rest - late.scaled(mass) - middle, drive.low
         if not constant:  # where the effect of φ̂ may change, φ* is for its middle
             centre, around = (drive.high + drive.low) / 2, (drive.high - drive.low) / 2 * (1 + 1e-12)
             drive = Interval(centre)
@@ -199,8 +203,9 @@ class _Builder(Builder):
         left = self.symbols.range_of(Form(kept, rest.constant))
         still = over(met + middle, {**self.symbols.ranges, **self._resting()})
         return _Demand(
-            level / drive, change / drive.low * (1 + 1e-12), left.magnitude, (left.low + left.high) / 2, still / drive
-        )
+            range=level / drive, rate=change / drive.low * (1 + 1e-12), rest=left.magnitude,
+            lean=(left.low + left.high) / 2, settled=left.magnitude / least, resting=still / drive,
+        )  # fmt: skip
 
     def _resting(self) -> dict[str, Interval]:
         """The reference while it rests at first."""

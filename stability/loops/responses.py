@@ -164,14 +164,14 @@ class _Sum:
         """The sums."""
         n, m, q = self.stack.sizes
         order, growths = self.stack.order, [1.0, *self.growths]
-        past, starts, totals = self._past()
+        past, totals, after = self._past()
         done = np.cumsum((0, *self.groups))
         # what acts in period P meets period P + k + 1 with weight growth^(k + 1); a group has the weight of its end
         weights = np.array(growths)[:, None] ** done[1:]
         rest = self._integrals(past, totals, weights)
         felt, begun = self._discrete(past, totals, weights, m + q + n)
         now, fixed = self._current(), np.abs(self.rows[:, order:])
-        last = self.basis.of_rows(starts[-1] @ self.block)
+        last = self.basis.of_rows(after)
         sums = []
         for k, growth in enumerate(growths):
             left = self._left(last, growth, growth ** float(done[-1]))
@@ -188,19 +188,18 @@ class _Sum:
         )  # fmt: skip
 
     def _past(self) -> tuple[Array, Array, Array]:
-        """Rows over y at the start of each group, rows at the last period of each, and sums over each group."""
+        """Rows over y at the start of each group, their sums over each group, and the row after the last."""
         order = self.stack.order
         powers, sums = [np.eye(order)], [np.zeros((order, order))]
         for _ in range(max(self.groups)):
             sums.append(sums[-1] + powers[-1])
             powers.append(powers[-1] @ self.block)
-        row, past, final = self.rows[:, :order] @ self.basis.columns, [], []
+        row, past = self.rows[:, :order] @ self.basis.columns, []
         for p in self.groups:
             past.append(row)
-            final.append(row @ powers[p - 1])
             row = row @ powers[p]
         first = np.array(past)
-        return first, np.array(final), first @ np.array([sums[p] for p in self.groups])
+        return first, first @ np.array([sums[p] for p in self.groups]), row
 
     def _integrals(self, past: Array, totals: Array, weights: Array) -> Array:
         """Weighted sums of ∫|past fold exp(flow (T - s)) sources| ds over a period, for each row of weights."""

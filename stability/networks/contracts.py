@@ -147,10 +147,9 @@ def replaced(
     return {**contracts, name: replace(made, guarantee=told)}
 
 
-def prove(name: str, own: Subsystem, bounds: Bounds, *, refine: bool = False) -> Contract | Failure:
+def prove(name: str, own: Subsystem, bounds: Bounds) -> Contract | Failure:
     """One member under given assumptions, with the tube that it can guarantee."""
-    search = certify_impulse(own.model, bounds, own.gains, own.limit, refine=refine)
-    return _contract(name, own, bounds, search)
+    return _contract(name, own, bounds, certify_impulse(own.model, bounds, own.gains, own.limit))
 
 
 def _proved(name: str, own: Subsystem, bounds: Bounds, search: Search | Failure) -> Contract | Failure:

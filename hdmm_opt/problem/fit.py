@@ -1,0 +1,124 @@
+"""Whether the sections of a study fit its machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from trajectories import Reference
+
+from ..errors import InvalidInputError
+from ..machines.machine import Machine
+from ..names import nearest
+from ..plants import Plant
+from ..study import Study
+
+_SUFFIX = {"m": "m", "m/s": "m_s", "N m": "nm", "A": "a", "rad": "rad", "rad/s": "rad_s", "N": "n", "Pa": "pa"}
+
+
+def check_disturbances(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
+    """The study's disturbances are those of the machine."""
+    given, known = study.uncertainty.disturbances, [d.name for d in machine.disturbances]
+    for name in given:
+        if name not in known:
+            yield InvalidInputError(f'unknown key "uncertainty.disturbances.{name}"; {nearest(name, known)}')
+    for disturbance in machine.disturbances:
+        name = disturbance.name
+        if name not in given and set(given) <= set(known):
+            yield InvalidInputError(f'"uncertainty.disturbances.{name}" is required and missing; give its range')
+        if name not in given:
+            continue
+        low, high = given[name].range
+        if given[name].unit not in (None, disturbance.unit):
+            yield InvalidInputError(
+                f'uncertainty.disturbances.{name}.unit must be "{disturbance.unit}": got "{given[name].unit}"; '
+                "convert the range"
+            )
+        if machine.forces is None and low == high:
+            yield InvalidInputError(
+                f"uncertainty.disturbances.{name} is an empty range: got [{low:g}, {high:g}]; widen it"
+            )
+        if machine.forces is not None and given[name].rate is not None:
+            yield InvalidInputError(
+                f"uncertainty.disturbances.{name}.rate has no meaning here: {name} is constant in a run; remove it"
+            )
+        if disturbance.course == "constant" and (low < 0 or given[name].course == "any"):
+            yield InvalidInputError(
+                f"uncertainty.disturbances.{name} is a constant of 0 or more: got [{low:g}, {high:g}]; correct it"
+            )
+
+
+def check_scenarios(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
+    """Scenarios name parameters that there are, and faults that fit the inputs."""
+    pairs = list(zip(machine.members, machine.plants, strict=True))
+    known = {key for _, plant in pairs for key in plant.parameters}
+    known |= {f"{name}.{key}" for name, plant in pairs for key in plant.parameters}
+    constants = {d.name for d in machine.disturbances if d.course == "constant"}
+    for scenario in study.validation.scenarios:
+        where = f"validation.scenarios.{scenario.name}"
+        for name in scenario.parameters:
+            if name not in known:
+                yield InvalidInputError(f"{where}.parameters.{name} is unknown; {nearest(name, sorted(known))}")
+        for name, course in scenario.disturbances.items():
+            if name in constants and len({value for _, value in course}) > 1:
+                yield InvalidInputError(f"{where}.disturbances.{name} is constant in a run; give one number")
+        for name, plant in pairs:
+            stuck = scenario.faults[name].stuck if name in scenario.faults else ()
+            if len(stuck) > len(plant.inputs):
+                yield InvalidInputError(
+                    f"{where}.faults.{name}.stuck has at most one entry for each of "
+                    f"{', '.join(plant.inputs)}: got {len(stuck)}; remove what is too much"
+                )
+
+
+def check_rates(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
+    """All control rates divide the fastest one."""
+    rates = {name: study.controller.rate_of(name) for name in machine.members}
+    fastest = max(rates.values())
+    for name, rate in rates.items():
+        if abs(round(fastest / rate) * rate / fastest - 1) > 1e-9:
+            yield InvalidInputError(
+                f"controller.rates_hz.{name} must divide the fastest rate, {fastest:g} Hz: got {rate:g}; "
+                f"{fastest / round(fastest / rate):g} would do"
+            )
+
+
+def check_motion(machine: Machine, references: tuple[Reference, ...]) -> None:
+    """No reference passes by itself what limits the rate of a first state."""
+    for name, plant, reference in zip(machine.members, machine.plants, references, strict=True):
+        if plant.first != "position" or len(plant.states) < 2:
+            continue
+        low, high = reference.bounds()[1]
+        for limit in plant.limits:
+            peak = max(-low, high)
+            if limit.signals == (plant.states[1],) and not peak < limit.value:
+                where = f"{name}: " if len(machine.members) > 1 else ""
+                raise InvalidInputError(
+                    f"reference: {where}its {limit.name} reaches {peak:.4g} {limit.unit}, the limit of the plant is "
+                    f"{limit.value:.4g} {limit.unit}; allow more time or raise the limit"
+                )
+
+
+def state_key(plant: Plant, state: str) -> str:
+    """The key of a state in a study: its name and its unit."""
+    return f"{state}_{_SUFFIX[plant.state_units[plant.states.index(state)]]}"
+
+
+def check_states(section: str, given: Mapping[str, float], machine: Machine) -> Iterator[InvalidInputError]:
+    """Keys are names of states, alone or with their unit."""
+    shown = list(dict.fromkeys(state_key(plant, s) for plant in machine.plants for s in plant.states))
+    known = [*shown, *(s for plant in machine.plants for s in plant.states)]
+    for name in given:
+        if name not in known:
+            yield InvalidInputError(f'unknown key "{section}.{name}"; {nearest(name, shown)}')
+
+
+def check_shared(machine: Machine, values: Mapping[str, tuple[float, ...]], kind: str) -> Iterator[InvalidInputError]:
+    """States of one name have one bound in all members."""
+    found: dict[str, float] = {}
+    for name, plant in zip(machine.members, machine.plants, strict=True):
+        for state, value in zip(plant.states, values[name], strict=True):
+            if found.setdefault(state, value) != value:
+                yield InvalidInputError(
+                    f'uncertainty.{kind} gives "{state}" in two units: got {found[state]:g} and {value:g}; '
+                    "name it once, without a unit"
+                )
