@@ -120,18 +120,16 @@ def longest_period(problem: Problem, gains: GainSet, *, proved: bool = False) ->
         return slower is not None and violation(slower, contracts_of(slower, gains), gains) == 0.0
 
     steps = LINKED_STEPS if problem.linked else STEPS
-    low = high = problem.period
-    if good(high):
-        while good(2 * high) and high < LONGEST * problem.period:
-            high *= 2
-        low, high = high, 2 * high
+    low = problem.period
+    if good(low):
+        while good(2 * low) and low < LONGEST * problem.period:
+            low *= 2
     elif proved:
-        return high
+        return low
     else:
-        low = high / 2.0**steps
-        if not good(low):
-            return 0.0
-    for _ in range(steps):
+        low = next((p for p in (low / 2.0**k for k in range(1, steps + 1)) if good(p)), 0.0)
+    high = 2 * low
+    for _ in range(steps if low else 0):
         middle = math.sqrt(low * high)
         low, high = (middle, high) if good(middle) else (low, middle)
     return low

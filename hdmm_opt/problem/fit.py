@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from stability.loops.stack import MAX_DELAY
 from trajectories import Reference
 
 from ..errors import InvalidInputError
@@ -71,9 +72,14 @@ def check_scenarios(study: Study, machine: Machine) -> Iterator[InvalidInputErro
 
 
 def check_rates(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
-    """All control rates divide the fastest one."""
+    """All control rates divide the fastest one, at which the computing delay is of so many periods at most."""
     rates = {name: study.controller.rate_of(name) for name in machine.members}
-    fastest = max(rates.values())
+    fastest, delay = max(rates.values()), study.controller.delay_s
+    if delay * fastest > MAX_DELAY:
+        yield InvalidInputError(
+            f"controller.delay_s is at most {MAX_DELAY} control periods: got {delay:g} s, {delay * fastest:.3g} periods "
+            f"at {fastest:g} Hz; {MAX_DELAY / fastest:g} s would do, or a rate of {MAX_DELAY / delay:.4g} Hz"
+        )
     for name, rate in rates.items():
         if abs(round(fastest / rate) * rate / fastest - 1) > 1e-9:
             yield InvalidInputError(

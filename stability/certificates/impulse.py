@@ -27,7 +27,7 @@ from ..loops.box import Box, DeviationRows, UnboundedError
 from ..loops.deviation import NOTHING, deviation_rows, first_box, networks, rounded
 from ..loops.model import Bounds, Gains, LoopModel
 from ..loops.responses import Responses, responses
-from ..loops.stack import Stack, controller, delay_of, turn, wiring
+from ..loops.stack import MAX_DELAY, Stack, controller, delay_of, turn, wiring
 from .certificate import Certificate, Failure
 from .small_gain import COARSE, FINE, Cell, Cut, cell_of, cells_of, closed, late_of, middle_of, small_gain
 
@@ -37,6 +37,8 @@ Array = NDArray[np.float64]
 WIDENING, ROOM = 1.004, 1.001
 #: Iterations of the box.
 STEPS = 120
+#: Responses are summed anew where the middle of a gain moves by this share.
+MOVED = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +95,9 @@ def begun(
     """A search with the responses of its loop, or why there is none; arguments as in `Search`."""
     if not bounds.period > 0:
         return Failure(reason="a sampled loop needs a control period above 0")
+    if bounds.delay > MAX_DELAY * bounds.period:
+        late = bounds.delay / bounds.period
+        return Failure(reason=f"the computing delay is of {late:.3g} periods, {MAX_DELAY} is the limit")
     try:
         return Search(model, bounds, gains, limit, FINE if fine else COARSE)
     except np.linalg.LinAlgError:
@@ -132,7 +137,10 @@ class Search:
         self.split = cut.of(self.rows)
         self.force = np.array([rounded(row) for row in (self.rows.low + self.rows.high) / 2])
         self.drive = np.array([rounded(row) for row in (self.rows.input_low + self.rows.input_high) / 2])
-        self.responses = [responses(self._stack(part, bounds)) for part in cells_of(self.rows, self.split)]
+        self.responses = self._responses(self.rows, bounds)
+
+    def _responses(self, rows: DeviationRows, bounds: Bounds) -> list[Responses | None]:
+        return [responses(self._stack(part, bounds)) for part in cells_of(rows, self.split)]
 
     def _stack(self, rows: DeviationRows, bounds: Bounds) -> Stack:
         mass = middle_of(rows)
@@ -145,8 +153,6 @@ class Search:
 
     def run(self, bounds: Bounds) -> Impulse | Failure:
         """The certificate under some assumptions, which may be other ones than the search was begun with."""
-        if any(r is None for r in self.responses):
-            return self._unstable(bounds)
         try:
             return self._settled(bounds)
         except UnboundedError as error:
@@ -154,10 +160,12 @@ class Search:
 
     def _settled(self, bounds: Bounds) -> Impulse | Failure:
         known = [r for r in self.responses if r is not None]
-        box = self.box
+        box, taken = self.box, self.rows
         for _ in range(STEPS):
             rows = deviation_rows(self.model, bounds, self.gains, box)
             parts = cells_of(rows, self.split)
+            if len(known) < len(parts):
+                return self._unstable(rows, bounds)
             found = [self._cell(part, r, bounds, box) for part, r in zip(parts, known, strict=True)]
             solved = [entry for entry in found if isinstance(entry, _Bound)]
             if len(solved) < len(found):
@@ -165,7 +173,11 @@ class Search:
             needed = self._needed(rows, solved, bounds)
             have = [box.half_widths, box.input_bound, box.network_bound]
             if all((want * ROOM <= own).all() for want, own in zip(needed, have, strict=True)):
-                return self._certificate(rows, known, solved, bounds, box)
+                if _moved(taken, rows) <= MOVED:
+                    return self._certificate(rows, known, solved, bounds, box)
+                # an adaptive gain has a middle that depends on the box
+                known, taken = [r for r in self._responses(rows, bounds) if r is not None], rows
+                continue
             if (needed[0] > self.limit).any():
                 worst = int(np.argmax(needed[0] / self.limit))
                 return Failure(reason="the certified set outgrows the operating box", row=worst)
@@ -182,7 +194,8 @@ class Search:
         """The small-gain bounds of one cell."""
         stack = known.stack
         n = stack.sizes[0]
-        reads, push = small_gain(rows, stack, bounds)
+        control = controller(self.model, self.gains, rows, bounds.period)
+        reads, push = small_gain(rows, replace(stack, control=control), bounds)
         first = self._start(rows, bounds, box)
         plain = known.plain
         forced = plain.rest[:, :n] @ push[:n] + plain.rest[:, n:] @ rows.demand_rate
@@ -234,9 +247,10 @@ class Search:
             estimates=np.max(np.abs([box.low, box.high]), axis=0) + box.network_bound,
         )  # fmt: skip
 
-    def _unstable(self, bounds: Bounds) -> Failure:
+    def _unstable(self, rows: DeviationRows, bounds: Bounds) -> Failure:
         """Why a loop has no summable responses."""
-        part = cells_of(self.rows, self.split)[next(i for i, r in enumerate(self.responses) if r is None)]
+        kept = zip(cells_of(rows, self.split), self._responses(rows, bounds), strict=True)
+        part = next(part for part, r in kept if r is None)
         stack = self._stack(part, bounds)
         poles = np.linalg.eigvals(turn(stack, 1).image[:, : stack.order])
         largest = float(np.max(np.abs(poles)))
@@ -246,6 +260,12 @@ class Search:
         else:
             text = f"no coordinates are found in which the loop contracts at {rate:g} Hz"
         return Failure(reason=text, row=len(self.limit) - 1)
+
+
+def _moved(before: DeviationRows, after: DeviationRows) -> float:
+    """The largest change of a gain's middle, as a share."""
+    old, new = (rows.half_low + rows.half_high for rows in (before, after))
+    return float(np.max(np.abs(new / old - 1)))
 
 
 def periods_in(time: float, period: float) -> int:

@@ -16,13 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .box import DeviationRows
-from .deviation import networks
+from .deviation import ROUNDED, networks
 from .model import Gains, LoopModel
 
 Array = NDArray[np.float64]
 
 #: A switch this close to a sample is at it, as a share of the period.
 AT_ONCE = 1e-9
+#: Largest delay in periods: every pending input is a state of the loop.
+MAX_DELAY = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,43 +58,62 @@ def controller(model: LoopModel, gains: tuple[Gains, ...], rows: DeviationRows, 
     """Q_i = z_i + b_j Q_j + c_j along the rows that track each other; v = -b Q - c; c <- c + T γ Q."""
     governed, own = list(model.controlled), networks(model, gains)
     n, q = len(model.rows), len(own)
-    middle, radius = (rows.half_low + rows.half_high) / 2, (rows.half_high - rows.half_low) / 2
-    found: dict[int, tuple[Array, Array]] = {}
+    found: dict[int, _Range] = {}
 
-    def error(i: int) -> tuple[Array, Array]:
-        """Q_i over (z, c), and its radius."""
+    def error(i: int) -> _Range:
+        """Q_i over (z, c)."""
         if i not in found:
-            value, spread, target = np.zeros(n + q), np.zeros(n + q), model.rows[i].target
-            value[i] = 1.0
-            if isinstance(target, int):
-                control, loose = action(target)
-                value, spread = value - control, spread + loose
-            found[i] = value, spread
+            value, target = _Range.of(np.eye(n, n + q)[i]), model.rows[i].target
+            found[i] = value + action(target).times(-1.0, -1.0) if isinstance(target, int) else value
         return found[i]
 
-    def action(i: int) -> tuple[Array, Array]:
-        """κ_i less its operating value, over (z, c): -b_i Q_i - c_i; and its radius."""
-        value, spread = error(i)
+    def action(i: int) -> _Range:
+        """κ_i less its operating value, over (z, c): -b_i Q_i - c_i."""
         g = governed.index(i)
-        control = -middle[g] * value
-        loose = radius[g] * (np.abs(value) + spread) + middle[g] * spread
-        if i in own:
-            control[n + own.index(i)] -= 1.0
-        return control, loose
+        control = error(i).times(-rows.half_high[g], -rows.half_low[g])
+        return control + _Range.of(-np.eye(q, n + q, n)[own.index(i)]) if i in own else control
 
     actions = [action(row) for row in model.input_map]
-    rates = np.array([period * gains[governed.index(i)].gamma for i in own])
-    learned = [error(i) for i in own]
-    values = np.array([r * value for r, (value, _) in zip(rates, learned, strict=True)]).reshape(q, n + q)
-    spreads = np.array(
-        [r * ((1 + 2.0**-22) * s + 2.0**-22 * np.abs(v)) for r, (v, s) in zip(rates, learned, strict=True)]
-    ).reshape(q, n + q)
-    control, loose = (np.array([pair[k] for pair in actions]) for k in (0, 1))
+    rates = [period * gains[governed.index(i)].gamma for i in own]
+    learned = [error(i).times(r * ROUNDED.low, r * ROUNDED.high) for i, r in zip(own, rates, strict=True)]
+    (control, loose), (values, spreads) = (
+        (np.array([r.middle for r in part]).reshape(-1, n + q), np.array([r.radius for r in part]).reshape(-1, n + q))
+        for part in (actions, learned)
+    )
     return Controller(
         feedback=-control[:, :n], feedback_spread=loose[:, :n], network=-control[:, n:], network_spread=loose[:, n:],
         entry=values[:, :n], entry_spread=spreads[:, :n], keep=np.eye(q) + values[:, n:], keep_spread=spreads[:, n:],
         start=_start(model, gains, own),
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Range:
+    """Rows between two."""
+
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, row: Array) -> _Range:
+        """One row."""
+        return cls(row, row)
+
+    @property
+    def middle(self) -> Array:
+        return (self.low + self.high) / 2
+
+    @property
+    def radius(self) -> Array:
+        return (self.high - self.low) / 2
+
+    def __add__(self, other: _Range) -> _Range:
+        return _Range(self.low + other.low, self.high + other.high)
+
+    def times(self, low: float, high: float) -> _Range:
+        """With a number between two."""
+        ends = [end * factor for end in (self.low, self.high) for factor in (low, high)]
+        return _Range(np.min(ends, axis=0), np.max(ends, axis=0))
 
 
 def _start(model: LoopModel, gains: tuple[Gains, ...], own: list[int]) -> Array:

@@ -82,7 +82,7 @@ def random_case(family: str, seed: int) -> Case:
         noise=tuple(1e-3 * size * random.uniform(0, 1, n)),
         initial=tuple(0.05 * size * random.uniform(0, 1, n)),
         period=period,
-        transient=40 * period,
+        transient=40.5 * period,  # a whole number of rounded periods may be one fewer
     )
     epsilon = random.uniform(0, 0.2, n) / size
     gains = tuple(
