@@ -15,8 +15,10 @@ from hdmm_opt.files.read import read
 from hdmm_opt.files.restore import restored
 from hdmm_opt.problem import GainSet, Problem, assemble
 from hdmm_opt.simulation import Loop, Run, Scenario
-from stability import Certificate, Gains, certify, certify_impulse, checker
+from stability import Certificate, Gains, Impulse, certify, certify_impulse, checker
+from stability.certificates.impulse import Search
 from stability.certificates.quadratic import Inclusion, prove, search
+from stability.certificates.small_gain import Cut
 from stability.networks.contracts import Assume, Subsystem, replaced, solve_contracts
 from stability.networks.springs import Coupling, coupled
 
@@ -118,6 +120,41 @@ def quadratic() -> None:
     show("quadratic certificate", [*searches, *checks])
 
 
+def growth() -> None:
+    """Search and exact check of one certificate, by order, periods of delay and cells."""
+    period, ways = 5e-4, []
+    for order in (1, 2, 3):
+        gains = tuple(Gains(beta=2 * w) for w in (15.0, 100.0, 600.0)[:order])
+        limit = np.array([1.0, 10.0, 1000.0])[:order]
+        ways.append((f"{order} rows", integrator_chain(order), chain_bounds(order, period=period), gains, limit, (1,)))
+    gains, limit = tuple(Gains(beta=2 * w) for w in (10.0, 40.0)), np.array([1.0, 10.0])
+    for late in (1, 2, 4, 8):
+        bounds = chain_bounds(2, period=period, delay=late * period)
+        ways.append((f"2 rows, {late} periods of delay", integrator_chain(2), bounds, gains, limit, (1,)))
+    problem, found = restored(read(FILES / "emla-p2.gains.json"))
+    (member,) = problem.members
+    own = member.gains(found[member.name])
+    ways.append(("emla-p2, cells", member.model, member.bounds, own, member.box, (4, 8, 15)))
+    searches, checks = [], []
+    for name, model, bounds, values, box, cells in ways:
+        for count in cells:
+            cut = Cut(1e-9, count, count)
+            search = lambda m=model, b=bounds, v=values, w=box, c=cut: Search(m, b, v, w, c).run(b)  # noqa: E731
+            made = search()
+            assert isinstance(made, Impulse), (name, made)
+            claim, told = claim_of(model, bounds, values, made), name.replace("cells", f"{len(made.cells)} cells")
+            searches.append((f"search, {told}", fastest(search, 3)))
+            checks.append((f"exact check, {told}", fastest(lambda c=claim: decide(c), 1)))
+    show("growth of one certificate", searches)
+    show("growth of its exact check", checks)
+
+
+def decide(claim: checker.Claim) -> None:
+    """Every obligation of a claim."""
+    checker.WORK.begin(checker.MAX_PRODUCTS)
+    checker.obligations(claim)
+
+
 def studies() -> None:
     """Certificates and exact checks of the bundled studies, beside their bounds."""
     rows = []
@@ -169,6 +206,7 @@ def main() -> None:
     modular()
     quadratic()
     studies()
+    growth()
     show(
         "closed loop, 0.5 s of emla-p2",
         [

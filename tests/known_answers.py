@@ -53,7 +53,13 @@ def integrator_chain(order: int, *, unit: float = 1.0) -> LoopModel:
 
 
 def chain_bounds(
-    order: int, *, spread: float = 0.0, period: float = 0.0, unit: float = 1.0, disturbance: float = DISTURBANCE
+    order: int,
+    *,
+    spread: float = 0.0,
+    period: float = 0.0,
+    unit: float = 1.0,
+    disturbance: float = DISTURBANCE,
+    delay: float = 0.0,
 ) -> Bounds:
     """Constant reference, no noise, |w| <= disturbance, g in 1 ± spread."""
     return Bounds(
@@ -64,6 +70,7 @@ def chain_bounds(
         noise=(0.0,) * order,
         initial=(0.0,) * order,
         period=period,
+        delay=delay,
     )
 
 

@@ -32,6 +32,7 @@ def proportional():
         **{f"sigma_{k}": {"min": 1.0, "max": 50.0} for k in (1, 2)},
     }
     data["uncertainty"]["disturbances"]["load_force"].pop("rate")
+    data["requirements"].pop("settling_band_m")
     data["uncertainty"]["initial"] = {"position_m": 1e-4, "speed_m_s": 3e-3, "torque_nm": 12.0}
     data["tuning"] |= {"population": 20, "iterations": 20, "weights": {}}
     return data

@@ -87,7 +87,7 @@ def proved(result: Design, *, verbose: bool = False) -> None:
     for name, entry in document["study"]["uncertainty"]["disturbances"].items():
         low, high = entry["range"]
         _say(f"for {name} from {low:g} to {high:g} {entry['unit']}", 2)
-    for line in (*_pinned(result), *_rated(result), *(result.notes if verbose else result.notes[-1:])):
+    for line in (*_pinned(result), *_rated(result), *(result.notes if verbose else result.notes[-1:]), *result.parts):
         _say(line, 2)
     _sources(result)
     if verbose:

@@ -20,7 +20,7 @@ def recorded_plant(document: Mapping[str, Any]) -> PlantModel:
         document: A gain file, or what a refused design left.
 
     Returns:
-        The plant with the numbers of the file's study. It has no outputs beside its states: a file holds none.
+        The plant with the numbers of the file's study, and of its outputs those that requirements are about.
     """
     (entry,) = document["members"]
     study = document["study"]
@@ -64,8 +64,10 @@ def _plant(study: Mapping[str, Any], section: Mapping[str, Any], model: Mapping[
         state_units=tuple(row["unit"] for row in rows), inputs=inputs, input_unit=limits[0].unit,
         disturbances=tuple(disturbed), parameters=known, targets=tuple(row["target"] for row in rows),
         controlled=tuple(row["controlled"] for row in rows), input_map=tuple(model["input_map"]), x=x, u=u, w=w, p=p,
-        mass=values[:n], force=values[n:], limits=limits, stroke=tuple(section[STROKE[unit]]), outputs={},
-        output_units={}, load_unit=next(iter(units)), first=model["first"],
+        mass=values[:n], force=values[n:], limits=limits, stroke=tuple(section[STROKE[unit]]),
+        outputs={name: _values(entry["program"], symbols)[0] for name, entry in model["outputs"].items()},
+        output_units={name: entry["unit"] for name, entry in model["outputs"].items()},
+        load_unit=next(iter(units)), first=model["first"],
     )  # fmt: skip
 
 

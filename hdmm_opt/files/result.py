@@ -78,6 +78,7 @@ class Design:
         problem: What was worked on.
         shown: What the simulations showed; None where the gains are not proved and nothing was simulated.
         notes: Which certificate was taken, and the longest control period at which the gains are proved.
+        parts: What the certified error is made of, and what the design would be without each part of its law.
     """
 
     document: dict[str, Any] | None
@@ -88,3 +89,4 @@ class Design:
     problem: Problem
     shown: Validation | None = None
     notes: tuple[str, ...] = ()
+    parts: tuple[str, ...] = ()

@@ -24,10 +24,10 @@ def _hashed(section: dict[str, Any]) -> dict[str, Any]:
 
 
 def prove(document: dict[str, Any]) -> tuple[dict[str, Any], checker.Report]:
-    """Fill in the obligations with the checker's verdicts, and seal; the file is checked once.
+    """Fill in the checker's verdicts and what it proved of the requirements, and seal; the file is checked once.
 
-    What the file records of the obligations is what the checker found on a draft without them: it is the same on the
-    finished file, which differs in nothing else.
+    What the file records of them is what the checker found on a draft without them: it is the same on the finished
+    file, which differs in nothing else.
     """
     report = checker.check_text(to_text(seal({**document, "obligations": []})), recorded=False)
     entries = [
@@ -35,7 +35,12 @@ def prove(document: dict[str, Any]) -> tuple[dict[str, Any], checker.Report]:
          "verdict": o.verdict}
         for o in report.obligations
     ]  # fmt: skip
-    return seal({**document, "obligations": entries}), report
+    shown = [
+        {**row, "certified": report.required[row["name"]][1]} if row["name"] in report.required else row
+        for row in document["validation"]["requirements"]
+    ]
+    validation = {**document["validation"], "requirements": shown}
+    return seal({**document, "obligations": entries, "validation": validation}), report
 
 
 def to_text(document: dict[str, Any]) -> str:

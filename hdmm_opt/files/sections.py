@@ -8,16 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from stability.enclosures.translation import straight_line
 from stability.networks.contracts import Contract
 from stability.networks.coupling import Tube
 from stability.networks.observer import sampled_bounds
 from trajectories import Reference
 
 from ..motions.slices import HALVINGS
+from ..plants.sound import BOUNDED
 from ..problem import GainSet, Member, Problem
 from ..problem.margins import output_bound
 from ..problem.member import Values
 from ..problem.problem import Contracts
+from ..simulation.requirements import MEMBER
 
 #: Significant digits of the certificate's rationals.
 DIGITS = 9
@@ -49,7 +52,24 @@ def reference_data(
 def model_data(member: Member) -> dict[str, Any]:
     """Plant and law of a member as operation lists, and what its limits are about."""
     limits = [{"name": limit.name, "signals": list(limit.signals)} for limit in member.plant.limits]
-    return {**member.model.to_data(), "limits": limits, "first": member.plant.first}
+    return {**member.model.to_data(), "limits": limits, "first": member.plant.first, "outputs": outputs_data(member)}
+
+
+def outputs_data(member: Member) -> dict[str, Any]:
+    """The outputs that a requirement can be about, where they follow from states and inputs in operations of a file."""
+    import casadi as ca
+
+    plant, found = member.plant, {}
+    names = (*plant.states, *plant.inputs, *plant.parameters)
+    wanted = {output for _, output in MEMBER.values()}
+    for name in sorted(wanted & set(plant.output_units)):
+        if ca.depends_on(plant.outputs[name], plant.w):
+            continue
+        given = ca.Function("output", [ca.vertcat(plant.x, plant.u, plant.p)], [plant.outputs[name]])
+        program = straight_line(given, names)
+        if {operator for operator, *_ in program.operations} <= set(BOUNDED):
+            found[name] = {"unit": plant.output_units[name], "program": program.to_data()}
+    return found
 
 
 def gains_data(member: Member, values: Values) -> list[dict[str, Any]]:

@@ -7,17 +7,15 @@ from fractions import Fraction
 from typing import Any
 
 from ..problem import Problem
-from ..problem.problem import Contracts
 from ..simulation import Figures, Scenario
 from ..simulation.figures import plain
 from ..simulation.requirements import figure_of, reached, required
-from .read import above, certified_of, ultimate_of
+from .read import certified_of, ultimate_of
 from .result import Validation, Witness
-from .sections import stated_output, stated_ultimate
 
 
-def to_data(problem: Problem, shown: Validation, contracts: Contracts) -> dict[str, Any]:
-    """The section of a design."""
+def to_data(problem: Problem, shown: Validation) -> dict[str, Any]:
+    """The section of a design; what is certified of the requirements is left to the checker, see `seal.py`."""
     members = {}
     for member in problem.members:
         own = [m.members[member.name] for m in shown.inside]
@@ -29,7 +27,7 @@ def to_data(problem: Problem, shown: Validation, contracts: Contracts) -> dict[s
             **({"estimates": [max(column) for column in zip(*estimates, strict=True)]} if estimates else {}),
         }
     return plain({
-        "requirements": requirements(problem, shown, contracts),
+        "requirements": requirements(problem, shown),
         "scenarios": [{"name": s.name, "figures": m.to_data()} for s, m in shown.runs],
         "worst_case": _worst(*shown.worst) if shown.worst else None,
         "monte_carlo": shown.monte_carlo,
@@ -45,19 +43,15 @@ def _worst(scenario: Scenario, figures: Figures) -> dict[str, Any]:
     return {"scenario": scenario.to_data(), "figures": figures.to_data()}
 
 
-def requirements(problem: Problem, shown: Validation, contracts: Contracts) -> list[dict[str, Any]]:
-    """Each requirement: required, simulated, and certified where it is proved."""
-    ultimates = {name: above(stated_ultimate(contract)) for name, contract in contracts.items()}
-    output = next(iter(ultimates.values())) if problem.loads is None else above(stated_output(problem, contracts))
-    proved = {"tracking_error_m": output, **{f"member_error.{name}": size for name, size in ultimates.items()}}
+def requirements(problem: Problem, shown: Validation) -> list[dict[str, Any]]:
+    """Each requirement: required, and simulated."""
     return [
-        {"name": name, "required": limit, "simulated": reached(problem, name, shown.inside),
-         "certified": proved.get(name)}
+        {"name": name, "required": limit, "simulated": reached(problem, name, shown.inside), "certified": None}
         for name, limit in required(problem).items()
-    ]  # fmt: skip
+    ]
 
 
-def contradiction(document: dict[str, Any], witness: Witness) -> str | None:
+def contradiction(problem: Problem, document: dict[str, Any], witness: Witness) -> str | None:
     """What a run did that the certificates of a gain file exclude, as text; None where nothing."""
     if not witness.largest_use < 1 - 1e-9:
         return f"a run used {witness.largest_use:.6g} of a limit that is proved"
@@ -70,6 +64,10 @@ def contradiction(document: dict[str, Any], witness: Witness) -> str | None:
     late, bound = witness.figures.maximum_error_m, certified_of(document)
     if not late <= bound:
         return f"a run reached {late:.6g} m, certified {bound:.6g} m, in scenario {scenario}"
+    for row in document["validation"]["requirements"]:
+        seen, told = figure_of(problem, row["name"], witness.figures), row["certified"]
+        if told is not None and not seen <= told:
+            return f"a run reached {row['name']} = {seen:.6g}, certified {told:.6g}, in scenario {scenario}"
     return None
 
 

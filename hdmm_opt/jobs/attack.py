@@ -44,7 +44,7 @@ def attacked(
     progress.stage("falsify")
     scenarios = [scenario for _, scenario in known.values()]
     found = falsify(loop, gains, scenarios, budget, seed, progress.update, jobs=jobs, state=state)
-    broken = contradiction(dict(document), found)
+    broken = contradiction(problem, dict(document), found)
     if broken is not None:
         raise DefectError(f"{broken}; please report this file with seed {seed}")
     return problem, found

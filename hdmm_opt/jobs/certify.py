@@ -23,14 +23,16 @@ from ..problem.problem import Contracts
 
 #: How many times the study's control period a certificate is looked for.
 LONGEST = 64
+#: States of linked members at most for their inertias to be cut into cells: the checker has 10 s for a file.
+FEW = 3
 #: Steps of a bisection for the longest period, of one member and of members that are linked.
 STEPS, LINKED_STEPS = 12, 4
 
 
 def contracts_of(problem: Problem, gains: GainSet, *, refine: bool = False) -> Contracts | Failure:
-    """Proofs of all members at their control periods, or why there are none; refined ones where nothing links them."""
+    """Proofs of all members at their control periods, or why there are none; refined ones where they can be."""
     if problem.linked:
-        return solve_contracts(problem.subsystems(gains), problem.assume)
+        return solve_contracts(problem.subsystems(gains), problem.assume, fine=refine and refinable(problem))
     found: Contracts = {}
     for member in problem.members:
         one = certificate(member, gains[member.name], refine=refine)
@@ -38,6 +40,11 @@ def contracts_of(problem: Problem, gains: GainSet, *, refine: bool = False) -> C
             return one
         found[member.name] = Contract(guarantee=None, reached=None, bounds=member.bounds, certificate=one)
     return found
+
+
+def refinable(problem: Problem) -> bool:
+    """Whether the checker has the time for cells of all members."""
+    return not problem.linked or max(len(member.model.rows) for member in problem.members) <= FEW
 
 
 def certificate(member: Member, values: Values, *, refine: bool = False) -> Impulse | Failure:
@@ -87,8 +94,9 @@ def strongest(problem: Problem, gains: GainSet) -> Strongest:
     found = contracts_of(problem, gains)
     if isinstance(found, Failure):
         return Strongest(contracts=contracts_of(problem, gains, refine=True), notes=())
-    if problem.linked:  # cells of three members at voltage level would take the checker too long
-        return Strongest(contracts=found, notes=())
+    if problem.linked:
+        finer = contracts_of(problem, gains, refine=True) if refinable(problem) else found
+        return Strongest(contracts=found if isinstance(finer, Failure) else finer, notes=())
     better: Contracts = {}
     for name in problem.subsystems(gains):
         member, finer = problem.member(name), certificate(problem.member(name), gains[name], refine=True)

@@ -53,14 +53,15 @@ def terms_that_help(problem: Problem, gains: GainSet, member: Member) -> str:
         return ""
     for count in range(1, len(missing) + 1):
         for terms in combinations(missing, count):
-            helped, _ = largest_demand(_with_terms(problem, (*given, *terms)), gains, member.name)
+            helped, _ = largest_demand(with_terms(problem, (*given, *terms)), gains, member.name)
             if helped <= limit.value:
                 named = " and ".join(f'"{term}"' for term in terms)
                 return f"with {named} in controller.modelling the same scenarios ask for {helped:.4g} {limit.unit}"
     return ""
 
 
-def _with_terms(problem: Problem, modelling: tuple[str, ...]) -> Problem:
+def with_terms(problem: Problem, modelling: tuple[str, ...]) -> Problem:
+    """The problem with other modelling terms in the law."""
     members = []
     for member in problem.members:
         law = law_for(problem.study.controller.law, member.plant, modelling)

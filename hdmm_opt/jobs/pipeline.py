@@ -24,6 +24,7 @@ from ..problem.verdict import from_checker
 from ..simulation import Loop
 from ..study import Study
 from .certify import longest_period, strongest
+from .contributions import budget_lines, contribution_lines, contributions
 from .falsification import falsify
 from .options import Effort, Options, Progress, effort_of
 from .polish import polished
@@ -96,14 +97,14 @@ def finished(
         progress=lambda part: progress.update(0.0, part),
     )  # fmt: skip
     agree(problem, contracts, shown)
-    document = build(loop, tuned.gains, contracts, to_data(problem, shown, contracts), kept=kept)
+    document = build(loop, tuned.gains, contracts, to_data(problem, shown), kept=kept)
     if effort.falsify:
         progress.stage("falsification")
         known = [s for s, _ in (*shown.runs, *([shown.worst] if shown.worst else []))]
         witness = falsify(
             loop, tuned.gains, known, effort.falsify, seed, progress.update, jobs=options.jobs, state=state
         )
-        broken = contradiction(document, witness)
+        broken = contradiction(problem, document, witness)
         if broken is not None:
             raise DefectError(f"{broken}; no file was written, please report this study")
         document = stored(problem, document, witness)
@@ -115,9 +116,14 @@ def finished(
         raise DefectError(f"{report.records}; no file was written, please report this study")
     accepted = report.status == 0 and not shown.missed
     told = (*notes, _rates(problem, tuned)) if accepted and kept is None else notes
+    parts: list[str] = []
+    if accepted and kept is None:
+        progress.stage("contributions")
+        parts += budget_lines(problem, tuned.gains, contracts)
+        parts += contribution_lines(problem, contributions(problem, tuned.gains))
     return Design(
         document=proved if accepted else None, report=report, verdicts=tuple(from_checker(report)),
-        missed=shown.missed, gains=tuned.gains, problem=problem, shown=shown, notes=told,
+        missed=shown.missed, gains=tuned.gains, problem=problem, shown=shown, notes=told, parts=tuple(parts),
     )  # fmt: skip
 
 

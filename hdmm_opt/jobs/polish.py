@@ -1,7 +1,7 @@
 """The last stage of a search: a pattern search around the winner, judged by refined certificates.
 
 Candidates of a search are judged with the inertias in few cells, which asks for more torque than is needed and so keeps
-gains low. Of members that something links the winner stays: a refined proof of all of them takes too long to repeat.
+gains low. Where the checker has no time for cells of all members, the winner stays.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 
 from ..problem import Problem
 from ..simulation import Loop
+from .certify import refinable
 from .evaluation import evaluate
 from .options import Progress
 from .start import Tuned
@@ -21,8 +22,8 @@ STEPS, MOST = (0.08, 0.03), 60
 
 
 def polished(problem: Problem, tuned: Tuned, progress: Progress) -> Tuned:
-    """Better gains nearby, by refined certificates; the same where there are none, or where members are linked."""
-    if problem.linked or not problem.searched:
+    """Better gains nearby, by refined certificates; the same where there are none, or where nothing is refined."""
+    if not refinable(problem) or not problem.searched:
         return tuned
     loop, best = Loop(problem), problem.point(tuned.gains)
     (outcome,) = evaluate(loop, [tuned.gains], refine=True)

@@ -159,7 +159,7 @@ def _torque_level(known: Mapping[str, Parameter], motor: Mapping[str, Parameter]
         stroke=STROKE,
         ratings=motor,
         outputs={
-            "torque": torque, "current": ca.fabs(torque) / motor["torque_constant"].value,
+            "torque": torque, "current": torque / motor["torque_constant"].value,
             "power": torque * x[1] / transmission(q),
         },
         output_units=_OUTPUT_UNITS, carried="load_mass",

@@ -77,8 +77,8 @@ def check_rates(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
     fastest, delay = max(rates.values()), study.controller.delay_s
     if delay * fastest > MAX_DELAY:
         yield InvalidInputError(
-            f"controller.delay_s is at most {MAX_DELAY} control periods: got {delay:g} s, {delay * fastest:.3g} periods "
-            f"at {fastest:g} Hz; {MAX_DELAY / fastest:g} s would do, or a rate of {MAX_DELAY / delay:.4g} Hz"
+            f"controller.delay_s is at most {MAX_DELAY} control periods: got {delay:g} s, {delay * fastest:.3g} "
+            f"periods at {fastest:g} Hz; {MAX_DELAY / fastest:g} s would do, or a rate of {MAX_DELAY / delay:.4g} Hz"
         )
     for name, rate in rates.items():
         if abs(round(fastest / rate) * rate / fastest - 1) > 1e-9:

@@ -29,9 +29,10 @@ from .limits import (
     need,
 )
 from .member import Member, check_member
-from .obligation import Obligation, Report, downward, milli, percent, upward
+from .obligation import Obligation, Report, above, downward, milli, percent, upward
 from .observer import observed
 from .parsing import check_digests, number, parse, wrong_schema
+from .requirements import beyond_error
 from .statement import met
 
 
@@ -130,7 +131,15 @@ def check_together(
     proved = {"tracking_error_m": members[0].claim.ultimate[0] if coupling is None else coupling.stated}
     if len(members) > 1:
         proved |= {f"member_error.{m.name}": m.claim.ultimate[0] for m in members}
+    proved |= beyond_error(data, members, coupling)
     records = ""
+    if not recorded:
+        for row in data["validation"]["requirements"]:
+            row["certified"] = Fraction(above(proved[row["name"]])) if row["name"] in proved else None
+    required = {
+        row["name"]: (float(row["required"]), above(proved[row["name"]]) if row["name"] in proved else None)
+        for row in data["validation"]["requirements"]
+    }
     try:
         met(data, proved)
     except UnreadableError as error:
@@ -147,7 +156,7 @@ def check_together(
     of = "" if coupling is None else f" of the output, all {len(members)} members together"
     message = f"proved: |tracking error{of}| <= {bound} from {settled} s on"
     used = [use for member in members for use in member.used]
-    return Report(file, 0, message, made, used, *unsourced(data), data["study"]["plant"]["model"], records)
+    return Report(file, 0, message, made, used, *unsourced(data), data["study"]["plant"]["model"], records, required)
 
 
 def unsourced(data: dict[str, Any]) -> tuple[list[str], list[str]]:
@@ -215,7 +224,7 @@ def show(reports: list[Report], *, as_json: bool, verbose: bool = False) -> None
         return
     for report in reports:
         print(f"{report.file}: {plainly(report.message)}")
-        for line in (*limit_lines(report), *source_lines(report)):
+        for line in (*limit_lines(report), *requirement_lines(report), *source_lines(report)):
             print(f"  {line}")
         for line in obligation_lines(report, everything=verbose):
             print(f"  {line}")
@@ -230,6 +239,16 @@ def limit_lines(report: Report) -> list[str]:
         before = f"{member}: " if len(members) > 1 else ""
         lines += wrapped(f"{before}of its limits at most: {shares}")
     return lines
+
+
+def requirement_lines(report: Report) -> list[str]:
+    """Which requirements are proved, and which are met in simulation only, in lines of a terminal."""
+    proved = [
+        f"{name} {upward(Fraction(b))} of {limit:g}" for name, (limit, b) in report.required.items() if b is not None
+    ]
+    seen = [name for name, (_, bound) in report.required.items() if bound is None]
+    lines = wrapped(f"proved of what is required: {', '.join(proved)}") if proved else []
+    return lines + (wrapped(f"required and simulated only: {', '.join(seen)}") if seen else [])
 
 
 def source_lines(report: Report) -> list[str]:

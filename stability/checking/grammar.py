@@ -127,6 +127,7 @@ MEMBER = entry_of(
             "law": listed(PROGRAM, 1, MAX_ROWS),
             "limits": listed(entry_of({"name": name, "signals": listed(name, 1, MAX_ROWS)}), 1, 16),
             "first": some("position", "speed"),
+            "outputs": named(entry_of({"unit": unit, "program": PROGRAM}), 8),
         }),
         "nominal": named(plain_number),
         "gains": listed(entry_of({"name": name, "value": plain_number, "unit": text, "min": plain_number,

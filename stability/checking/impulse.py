@@ -124,6 +124,7 @@ class Impulse:
             cuts.append([(low + k * width, low + (k + 1) * width) for k in range(count)])
         parts = zip(claim.cells, product(*cuts), strict=True)
         self.cells = [Bounded(Turn(claim, loop, list(masses)), cell) for cell, masses in parts]
+        self.later: dict[int, list[Fraction]] = {}
 
     def contraction(self) -> Fraction:
         """How far the slowest cell is from not contracting, with the weight of its transient."""
@@ -151,27 +152,31 @@ class Impulse:
     def _after(self, time: Fraction) -> list[Fraction]:
         """Bounds on y from a time on, in units of the box."""
         periods, found = int(time / self.claim.period), []
-        for cell in self.cells:
+        for cell in self.cells if periods not in self.later else ():
             left = 1 / _power(cell.cell.growth, periods)
             parts = zip(cell.forced, cell.amplitude, cell.whole, strict=True)
             found.append([min(forced + left * start, whole) for forced, start, whole in parts])
-        return [max(column) for column in zip(*found, strict=True)]
+        return self.later.setdefault(periods, [max(column) for column in zip(*found, strict=True)])
+
+    def sizes(self, time: Fraction) -> list[Fraction]:
+        """Bounds on |z| and on |v|, as commanded, from a time on."""
+        claim, after, n, m = self.claim, self._after(time), len(self.claim.rows), len(self.claim.inputs)
+        late = [max(cell.turn.late[k] for cell in self.cells) for k in range(m)]
+        moved = [*after[:n], *(v + w for v, w in zip(after[2 * n : 2 * n + m], late, strict=True))]
+        whole = [*claim.half_widths, *claim.input_bound]
+        return [min(up(v * r), r) for v, r in zip(moved, whole, strict=True)]
 
     def ultimate(self, i: int) -> Fraction:
         """Bound on |z_i| from the end of the transient on."""
-        claim = self.claim
-        return min(up(self._after(claim.transient)[i] * claim.half_widths[i]), claim.half_widths[i])
+        return self.sizes(self.claim.transient)[i]
 
     def largest(self, name: str) -> Fraction:
         """Bound on |input| as commanded, or on |state|: the start while the reference rests, what is left in motion."""
-        claim, loop, n, m = self.claim, self.loop, len(self.claim.rows), len(self.claim.inputs)
+        claim, loop = self.claim, self.loop
         whole = [*claim.half_widths, *claim.input_bound]
         if not claim.rest[1] > 0:
             return loop.size(name, whole, resting=False)
-        after = self._after(claim.rest[1])
-        late = [max(cell.turn.late[k] for cell in self.cells) for k in range(m)]
-        moved = [*after[:n], *(v + w for v, w in zip(after[2 * n : 2 * n + m], late, strict=True))]
-        moving = [min(up(v * r), r) for v, r in zip(moved, whole, strict=True)]
+        moving = self.sizes(claim.rest[1])
         return max(loop.size(name, moving, resting=False), loop.size(name, whole, resting=True))
 
     def speed(self, i: int) -> Fraction:

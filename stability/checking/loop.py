@@ -61,11 +61,11 @@ class Loop:
         for k, error in enumerate(claim.input_bound):
             table.ranges[f"e{k}"] = symmetric(error)
         for i, row in enumerate(claim.rows):
-            self._name(row["state"], plus({f"Q{i}": ONE}, self._target(i)))
+            self._name(row["state"], plus({f"Q{i}": ONE}, self.target(i)))
         for i in self.gain:
             self._control(i)
         for k, (name, row) in enumerate(zip(claim.inputs, claim.input_map, strict=True)):
-            self._name(name, plus(self._kappa(row), {f"e{k}": ONE}))
+            self._name(name, plus(self.kappa(row), {f"e{k}": ONE}))
 
     def _name(self, name: str, form: Form) -> None:
         self.nodes[name] = Node(self.table.key("input", name), form, self.table.over(form))
@@ -80,13 +80,14 @@ class Loop:
         else:
             self.nodes[name] = Node(self.table.key("input", name), {"": bounds}, bounds)
 
-    def _target(self, i: int) -> Form:
+    def target(self, i: int) -> Form:
+        """The operating value of state i."""
         target = self.claim.rows[i]["target"]
         if target == "reference":
             return {"r0": ONE}
-        return {} if target == "zero" else self._kappa(target)
+        return {} if target == "zero" else self.kappa(target)
 
-    def _kappa(self, i: int) -> Form:
+    def kappa(self, i: int) -> Form:
         """The operating value of row i's control: m_i, less φ*_i where it has a network."""
         self._control(i)
         return plus(self.model[i], {f"p{i}": neg(ONE)}) if i in self.claim.networks else self.model[i]
@@ -145,6 +146,7 @@ class Loop:
         self.demand: list[Interval] = []
         self.demand_rate: list[Fraction] = []
         self.settled: list[Fraction] = []
+        self.met: dict[int, tuple[Form, Interval]] = {}
         places = [claim.rest[0], Fraction(0), Fraction(0), Fraction(0)]
         self.resting: dict[str, Interval] = {f"r{k}": (place, place) for k, place in enumerate(places)}
         for i, row in enumerate(claim.rows):
@@ -195,6 +197,7 @@ class Loop:
                         {"": symmetric(around * magnitude(mul(level, inverse(drive))))})  # fmt: skip
         left = magnitude(self._left(rest))
         self.demand.append(mul(level, inverse(drive)))
+        self.met[i] = plus(met, middle), drive
         still = over(plus(met, middle), {**table.ranges, **self.resting})
         self.resting[f"p{i}"] = mul(still, inverse(drive))
         self.demand_rate.append(up(change / drive[0]))
@@ -217,6 +220,6 @@ class Loop:
         known |= {f"Q{i}": symmetric(r) for i, r in enumerate(deviations[:n])}
         if name in claim.inputs:
             k = claim.inputs.index(name)
-            return magnitude(over(self._kappa(claim.input_map[k]), known)) + deviations[n + k]
+            return magnitude(over(self.kappa(claim.input_map[k]), known)) + deviations[n + k]
         i = next(i for i, row in enumerate(claim.rows) if row["state"] == name)
-        return magnitude(over(self._target(i), known)) + deviations[i]
+        return magnitude(over(self.target(i), known)) + deviations[i]

@@ -32,6 +32,7 @@ class Member:
     loop: Loop
     made: list[Obligation]
     reached: tuple[Fraction, Fraction, Fraction] | None
+    verdict: Impulse
     ultimate: Fraction
     used: list[Use]
     failed: str
@@ -65,7 +66,8 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     elif seen > claim.half_widths[0]:
         failed = "the recorded simulation leaves the certified envelope"
     tube = tube_of(claim, verdict) if len(claim.rows) > accelerating(claim) else None
-    return Member(claim.name, claim, loop, made, tube, verdict.ultimate(0), uses(claim, loop, verdict), failed)
+    used = uses(claim, loop, verdict)
+    return Member(claim.name, claim, loop, made, tube, verdict, verdict.ultimate(0), used, failed)
 
 
 def tube_of(claim: Claim, verdict: Impulse) -> tuple[Fraction, Fraction, Fraction]:

@@ -35,7 +35,8 @@ class Report:
     """The verdict on one file: status 0 proved, 1 not proved, 2 unreadable.
 
     `uses` are the shares of the limits, `bundled` what the study left to the bundled machine `model`, `assumed` what
-    has no source, `records` what of a draft's records contradicts the study or the proof.
+    has no source, `records` what of a draft's records contradicts the study or the proof; `required` are the study's
+    requirements, with what is proved of each, or None where it is simulated only.
     """
 
     file: str
@@ -47,6 +48,7 @@ class Report:
     assumed: list[str] = field(default_factory=list)
     model: str = ""
     records: str = ""
+    required: dict[str, tuple[float, float | None]] = field(default_factory=dict)
 
 
 def decided(name: str, statement: str, margin: Fraction, unit: str, remedy: str, *, member: str = "",
@@ -62,6 +64,11 @@ def below(x: Fraction) -> float:
     """A float that is not above x."""
     found = float(x)
     return math.nextafter(found, -math.inf) if Fraction(found) > x else found
+
+
+def above(x: Fraction) -> float:
+    """A float that is not below x."""
+    return -below(-x) if x else 0.0
 
 
 def downward(x: Fraction | float, digits: int = 4) -> str:

@@ -101,7 +101,8 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Impulse]:
     error = verdict.ultimate(0)
     unit = str(claim.rows[0]["unit"])
     statement = f"from {upward(claim.transient, 6)} s on the tracking error is at most {milli(error, unit)}"
-    state("accuracy", statement, claim.accuracy - error, unit, f"a requirement of {milli(error, unit)}", False)
+    remedy = f"a requirement of {milli(max(error, claim.ultimate[0]), unit)}"
+    state("accuracy", statement, claim.accuracy - error, unit, remedy, False)
     for i, stated in enumerate(claim.ultimate):
         if stated < verdict.ultimate(i):
             raise NotProvedError(f"the envelope states a smaller bound on row {i + 1} than can be proved")

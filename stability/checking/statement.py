@@ -167,11 +167,11 @@ def _runs(data: dict[str, Any], certified: dict[str, Fraction]) -> None:
             for group, before in (("peaks", "peak"), ("rms", "rms")):
                 for output, unit in (("torque", "nm"), ("current", "a")):
                     met, value = told.get(f"{before}_{output}_{unit}"), own[group].get(output)
-                    if met is not None and value is not None and _rotary(data, name, output):
+                    if met is not None and value is not None and rotary(data, name, output):
                         need(value <= met, f"a recorded run passes {before}_{output}_{unit}")
 
 
-def _rotary(data: dict[str, Any], name: str, output: str) -> bool:
+def rotary(data: dict[str, Any], name: str, output: str) -> bool:
     """Whether a member's torque is in N m: that of a sliding joint is a force, and no requirement on torque."""
     rows = next(entry["model"]["rows"] for entry in data["members"] if entry["name"] == name)
     limit = next(iter(data["study"]["plant"]["joints"][name]["limits"].values()))

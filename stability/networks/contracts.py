@@ -73,13 +73,16 @@ class Contract:
 Assume = Callable[[Mapping[str, Tube]], Mapping[str, Bounds]]
 
 
-def solve_contracts(subsystems: Mapping[str, Subsystem], assume: Assume) -> dict[str, Contract] | Failure:
+def solve_contracts(
+    subsystems: Mapping[str, Subsystem], assume: Assume, *, fine: bool = False
+) -> dict[str, Contract] | Failure:
     """Contracts that hold together.
 
     Args:
         subsystems: The loops by name.
         assume: What the guarantees of all make of each one's disturbances and measurement errors; wider guarantees must
             give wider assumptions.
+        fine: Cut the ranges of the inertias; tighter, and slower.
 
     Returns:
         A contract for each member, or why there are none. The work grows linearly with their number.
@@ -92,7 +95,7 @@ def solve_contracts(subsystems: Mapping[str, Subsystem], assume: Assume) -> dict
         made: dict[str, Contract] = {}
         for name, own in subsystems.items():
             if name not in searches:
-                searches[name] = begun(own.model, assumed[name], own.gains, own.limit)
+                searches[name] = begun(own.model, assumed[name], own.gains, own.limit, fine=fine)
             found = _proved(name, own, assumed[name], searches[name])
             if isinstance(found, Failure):
                 return replace(found, together=turn > 0)

@@ -137,7 +137,7 @@ def test_a_fault_that_loses_the_loop_is_written_as_no_number():
     faulty = changed(name="lost", disturbances={"load_force": 70e3}, faults=lost)
     shown = validated(faulty)
     assert shown.runs[-1][1].diverged and shown.missed == ()
-    data = to_data(faulty, shown, contracts_of(faulty, GAINS))
+    data = to_data(faulty, shown)
     json.dumps(data, allow_nan=False)
     figures = data["scenarios"][-1]["figures"]
     assert figures["maximum_error_m"] is None and figures["diverged_s"] > 3.0
@@ -218,6 +218,7 @@ def test_the_integration_error_is_estimated(problem, loop):
 def test_descent_is_a_method_of_a_design():
     data = emla("emla-p4-fast")
     data["tuning"] |= {"method": "gradient"}
+    data["plant"].pop("limits")  # where the cascades end at the limit of the torque, nothing is left to descend to
     small = assemble(study.validated(data, "test"))
     first, found = searched(small, "gradient", (10, 3))
     before, after = evaluate(Loop(small), [first.gains, found.gains])

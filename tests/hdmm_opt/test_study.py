@@ -78,6 +78,7 @@ CASES = {
     "stroke upside down": (lambda: swapped("[tuning]", "[plant.joints.actuator]\nstroke_m = [0.5, 0.1]\n[tuning]"), "needs lower < upper"),
     "effectiveness as a parameter": (lambda: swapped("parameters.motor_inertia]\nvalue = 0.012\nunit = \"kg m^2\"", "parameters.effectiveness]\nvalue = 1.0\nunit = \"1\""), "is not a parameter of pmsm_emla"),
     "a rate that does not divide": (lambda: swapped("rate_hz = 1000", "rate_hz = 1000\nrates_hz = { other = 500 }"), "is not a member of this machine"),
+    "a delay of many periods": (lambda: swapped("delay_s = 1e-3", "delay_s = 0.02"), "a rate of 400 Hz"),
     "a section that has no place": (lambda: swapped('level = "torque"', 'level = "torque"\nurdf = "crane"'), 'has no place with model = "pmsm_emla"'),
     "unreachable torque": (lambda: swapped("torque_nm = 37.0", "torque_nm = 20.0"), "the limit is 20"),
     "truth for a number": (lambda: swapped("rate_hz = 1000", "rate_hz = true"), "must be a number or text: got true"),

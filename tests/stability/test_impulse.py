@@ -138,6 +138,12 @@ def test_cells_and_coordinates_only_help():
     assert verdict(claim_of(integrator_chain(2), chain_bounds(2, period=1e-3, spread=0.2), gains, refined))
 
 
+def test_a_delay_of_many_periods_is_refused_at_once():
+    found = certify_impulse_chain((15.0, 100.0), period=1e-6, delay=1e-3)
+    assert isinstance(found, Failure)
+    assert "1e+03 periods, 8 is the limit" in found.reason
+
+
 def test_a_continuous_law_is_no_business_of_this_certificate():
     assert isinstance(certify_impulse_chain((15.0, 100.0)), Failure)
 
