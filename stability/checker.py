@@ -2933,8 +2933,11 @@ def below(x: Fraction) -> float:
 
 
 def above(x: Fraction) -> float:
-    """A float that is not below x."""
-    return -below(-x) if x else 0.0
+    """A float whose shortest decimal is not below x."""
+    found = float(x)
+    while Fraction(repr(found)) < x:
+        found = math.nextafter(found, math.inf)
+    return found
 
 
 def downward(x: Fraction | float, digits: int = 4) -> str:
@@ -4089,7 +4092,7 @@ def check_together(
     records = ""
     if not recorded:
         for row in data["validation"]["requirements"]:
-            row["certified"] = Fraction(above(proved[row["name"]])) if row["name"] in proved else None
+            row["certified"] = Fraction(repr(above(proved[row["name"]]))) if row["name"] in proved else None
     required = {
         row["name"]: (float(row["required"]), above(proved[row["name"]]) if row["name"] in proved else None)
         for row in data["validation"]["requirements"]

@@ -135,7 +135,7 @@ def check_together(
     records = ""
     if not recorded:
         for row in data["validation"]["requirements"]:
-            row["certified"] = Fraction(above(proved[row["name"]])) if row["name"] in proved else None
+            row["certified"] = Fraction(repr(above(proved[row["name"]]))) if row["name"] in proved else None
     required = {
         row["name"]: (float(row["required"]), above(proved[row["name"]]) if row["name"] in proved else None)
         for row in data["validation"]["requirements"]

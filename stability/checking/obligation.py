@@ -67,8 +67,11 @@ def below(x: Fraction) -> float:
 
 
 def above(x: Fraction) -> float:
-    """A float that is not below x."""
-    return -below(-x) if x else 0.0
+    """A float whose shortest decimal is not below x."""
+    found = float(x)
+    while Fraction(repr(found)) < x:
+        found = math.nextafter(found, math.inf)
+    return found
 
 
 def downward(x: Fraction | float, digits: int = 4) -> str:

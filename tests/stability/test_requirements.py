@@ -6,6 +6,8 @@ from fractions import Fraction
 
 import pytest
 from conftest import GAINS
+from hypothesis import given
+from hypothesis import strategies as st
 
 from hdmm_opt.files.seal import seal, to_text
 from stability import checker
@@ -106,3 +108,9 @@ def test_the_rms_of_a_constant_is_its_size(document):
     high = member.claim.parameters["torque_scale"][1]
     assert all(high**2 <= square <= high**2 * (1 + Fraction(1, 10**9)) for _, square in parts)
     assert abs(sum(lasted for lasted, _ in parts) - 17) < Fraction(1, 10**6)
+
+
+@given(st.fractions(min_value=0, max_value=10**6))
+def test_a_written_bound_is_not_below_what_is_proved(bound):
+    """A file holds the shortest decimal of a float, which may lie below the float."""
+    assert bound <= Fraction(repr(checker.above(bound))) <= bound * (1 + Fraction(1, 10**15)) + Fraction(1, 10**300)
