@@ -24,6 +24,7 @@ def quick(tmp_path_factory):
     """emla-p2 with a short search and no draws: a design of a few seconds."""
     text = (resources.files("hdmm_opt") / "studies" / "emla-p2.toml").read_text(encoding="utf-8")
     text = re.sub(r"monte_carlo = \d+", "monte_carlo = 0", text).replace("worst_case = true", "worst_case = false")
+    text = re.sub(r"settling_band_m = .*\n", "", text)
     text = re.sub(r"iterations = \d+", "iterations = 2", re.sub(r"population = \d+", "population = 6", text))
     path = tmp_path_factory.mktemp("study") / "quick.toml"
     path.write_text(text, encoding="utf-8")
