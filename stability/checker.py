@@ -3834,8 +3834,10 @@ def room_for(assumed: Fraction, error: Fraction) -> Fraction:
 EFFORTS = {"torque": ("N m", "peak_torque_nm", "rms_torque_nm"), "current": ("A", "peak_current_a", "rms_current_a")}
 #: Slices of a rest at the start, and of a move that is one polynomial.
 WHOLE_MOVE = 8
-#: A settling time is found to this share of the motion: 2^-HALVINGS.
-HALVINGS = 14
+#: Slices of a motion at most for peaks and RMS; of a longer one they are simulated only.
+MOST_SLICES = 400
+#: A settling time is found to this share of what is required: 2^-HALVINGS.
+HALVINGS = 8
 
 
 def beyond_error(data: dict[str, Any], members: list[Member], coupling: Coupling | None) -> dict[str, Fraction]:
@@ -3907,7 +3909,10 @@ def _effort(
         if output not in own or (own[output][0] != unit and rotary(data, member.name, output)):
             return None, None
         if own[output][0] == unit:
-            parts = list(_slices(entry["reference"]["segments"], member, own[output][1]))
+            segments = entry["reference"]["segments"]
+            if sum(max(WHOLE_MOVE, len(segment["coefficients"])) for segment in segments) > MOST_SLICES:
+                return None, None
+            parts = list(_slices(segments, member, own[output][1]))
             whole = sum((lasted for lasted, _ in parts), Fraction(0))
             peaks.append(max(square for _, square in parts))
             means.append(sum((lasted * square for lasted, square in parts), Fraction(0)) / whole)

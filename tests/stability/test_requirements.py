@@ -98,6 +98,13 @@ def test_settling_is_the_first_time_inside_the_band(document):
     assert member.verdict.sizes(time)[0] <= band < member.verdict.sizes(time * Fraction(99, 100))[0]
 
 
+def test_a_motion_of_too_many_slices_is_simulated_only(document, monkeypatch):
+    monkeypatch.setattr(checker, "MOST_SLICES", 10)
+    report = checker.check_text(json.dumps(document), recorded=False)
+    assert report.status == 0
+    assert report.required["peak_torque_nm"][1] is None and report.required["settling_time_s"][1] is not None
+
+
 def test_the_rms_of_a_constant_is_its_size(document):
     """A machine that rests at a known torque: the RMS over slices is its peak."""
     data = checker.parse(json.dumps(document))
