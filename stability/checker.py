@@ -2933,9 +2933,9 @@ def below(x: Fraction) -> float:
 
 
 def above(x: Fraction) -> float:
-    """A float whose shortest decimal is not below x."""
+    """A float that is not below x, nor is its shortest decimal."""
     found = float(x)
-    while Fraction(repr(found)) < x:
+    while min(Fraction(found), Fraction(repr(found))) < x:
         found = math.nextafter(found, math.inf)
     return found
 
@@ -3100,12 +3100,15 @@ class Impulse:
 
     def _after(self, time: Fraction) -> list[Fraction]:
         """Bounds on y from a time on, in units of the box."""
-        periods, found = int(time / self.claim.period), []
-        for cell in self.cells if periods not in self.later else ():
-            left = 1 / _power(cell.cell.growth, periods)
-            parts = zip(cell.forced, cell.amplitude, cell.whole, strict=True)
-            found.append([min(forced + left * start, whole) for forced, start, whole in parts])
-        return self.later.setdefault(periods, [max(column) for column in zip(*found, strict=True)])
+        periods = int(time / self.claim.period)
+        if periods not in self.later:
+            found = []
+            for cell in self.cells:
+                left = 1 / _power(cell.cell.growth, periods)
+                parts = zip(cell.forced, cell.amplitude, cell.whole, strict=True)
+                found.append([min(forced + left * start, whole) for forced, start, whole in parts])
+            self.later[periods] = [max(column) for column in zip(*found, strict=True)]
+        return self.later[periods]
 
     def sizes(self, time: Fraction) -> list[Fraction]:
         """Bounds on |z| and on |v|, as commanded, from a time on."""
@@ -3127,6 +3130,10 @@ class Impulse:
             return loop.size(name, whole, resting=False)
         moving = self.sizes(claim.rest[1])
         return max(loop.size(name, moving, resting=False), loop.size(name, whole, resting=True))
+
+    def norm(self, signals: list[str]) -> Fraction:
+        """Bound on the norm of inputs as commanded, or of states."""
+        return root(up(sum((self.largest(s) ** 2 for s in signals), Fraction(0))), True)
 
     def speed(self, i: int) -> Fraction:
         """Bound on |z_i'| for all t."""
@@ -3306,8 +3313,7 @@ def authority(claim: Claim, loop: Loop, verdict: Impulse) -> list[tuple[Fraction
     """Distance of each limited norm from its limit over the certified set; then the stroke."""
     result = []
     for limit in claim.limits:
-        norm = root(up(sum((verdict.largest(s) ** 2 for s in limit["signals"]), Fraction(0))), True)
-        result.append((limit["value"] - norm, str(limit["unit"]), str(limit["name"])))
+        result.append((limit["value"] - verdict.norm(limit["signals"]), str(limit["unit"]), str(limit["name"])))
     position = loop.nodes[claim.rows[0]["state"]].range
     unit = str(claim.rows[0]["unit"])
     result.append((min(position[0] - claim.stroke[0], claim.stroke[1] - position[1]), unit, "stroke"))
@@ -3423,7 +3429,6 @@ class Member:
     made: list[Obligation]
     reached: tuple[Fraction, Fraction, Fraction] | None
     verdict: Impulse
-    ultimate: Fraction
     used: list[Use]
     failed: str
 
@@ -3456,8 +3461,7 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     elif seen > claim.half_widths[0]:
         failed = "the recorded simulation leaves the certified envelope"
     tube = tube_of(claim, verdict) if len(claim.rows) > accelerating(claim) else None
-    used = uses(claim, loop, verdict)
-    return Member(claim.name, claim, loop, made, tube, verdict, verdict.ultimate(0), used, failed)
+    return Member(claim.name, claim, loop, made, tube, verdict, uses(claim, loop, verdict), failed)
 
 
 def tube_of(claim: Claim, verdict: Impulse) -> tuple[Fraction, Fraction, Fraction]:
@@ -3583,7 +3587,7 @@ class Coupling:
         statement = "inside the guarantees the accelerations follow from the loads in one way: the coupling contracts"
         remedy = "less coupling between the members, or more inertia of the actuators"
         made.append(decided("coupling", statement, self._well_posed(), "1", remedy))
-        bound = self.output([member.ultimate for member in self.members])
+        bound = self.output([member.verdict.ultimate(0) for member in self.members])
         if self.stated < bound:
             raise NotProvedError("the envelope states a smaller bound on the output than can be proved")
         settled = upward(self.members[0].claim.transient, 6)
@@ -3891,11 +3895,8 @@ def _settled(data: dict[str, Any], members: list[Member], coupling: Coupling | N
 
 def _voltage(members: list[Member]) -> Fraction | None:
     """The largest certified amplitude of inputs in V."""
-    amplitudes = [
-        root(up(sum((member.verdict.largest(s) ** 2 for s in member.claim.inputs), Fraction(0))), True)
-        for member in members if member.claim.limits[0]["unit"] == "V"
-    ]  # fmt: skip
-    return max(amplitudes, default=None)
+    driven = [member for member in members if member.claim.limits[0]["unit"] == "V"]
+    return max((member.verdict.norm(member.claim.inputs) for member in driven), default=None)
 
 
 def _effort(
@@ -4095,13 +4096,11 @@ def check_together(
         proved |= {f"member_error.{m.name}": m.claim.ultimate[0] for m in members}
     proved |= beyond_error(data, members, coupling)
     records = ""
-    if not recorded:
-        for row in data["validation"]["requirements"]:
-            row["certified"] = Fraction(repr(above(proved[row["name"]]))) if row["name"] in proved else None
-    required = {
-        row["name"]: (float(row["required"]), above(proved[row["name"]]) if row["name"] in proved else None)
-        for row in data["validation"]["requirements"]
-    }
+    written, required = {name: above(bound) for name, bound in proved.items()}, {}
+    for row in data["validation"]["requirements"]:
+        required[row["name"]] = float(row["required"]), written.get(row["name"])
+        if not recorded:
+            row["certified"] = Fraction(written[row["name"]]) if row["name"] in written else None
     try:
         met(data, proved)
     except UnreadableError as error:

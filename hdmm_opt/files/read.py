@@ -75,7 +75,7 @@ def ultimate_of(entry: Mapping[str, Any]) -> float:
 
 def above(exact: str) -> float:
     """A float that is not below an exact bound of a file."""
-    return -checker.below(-Fraction(exact))
+    return checker.above(Fraction(exact))
 
 
 def references_of(document: Mapping[str, Any]) -> tuple[Reference, ...]:

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from stability.enclosures.translation import straight_line
 from stability.networks.contracts import Contract
 from stability.networks.coupling import Tube
 from stability.networks.observer import sampled_bounds
 from trajectories import Reference
 
 from ..motions.slices import HALVINGS
-from ..plants.sound import BOUNDED
+from ..plants.sound import program_of
 from ..problem import GainSet, Member, Problem
 from ..problem.margins import output_bound
 from ..problem.member import Values
@@ -57,17 +56,11 @@ def model_data(member: Member) -> dict[str, Any]:
 
 def outputs_data(member: Member) -> dict[str, Any]:
     """The outputs that a requirement can be about, where they follow from states and inputs in operations of a file."""
-    import casadi as ca
-
     plant, found = member.plant, {}
-    names = (*plant.states, *plant.inputs, *plant.parameters)
     wanted = {output for _, output in MEMBER.values()}
     for name in sorted(wanted & set(plant.output_units)):
-        if ca.depends_on(plant.outputs[name], plant.w):
-            continue
-        given = ca.Function("output", [ca.vertcat(plant.x, plant.u, plant.p)], [plant.outputs[name]])
-        program = straight_line(given, names)
-        if {operator for operator, *_ in program.operations} <= set(BOUNDED):
+        program, other = program_of(plant, plant.outputs[name])
+        if program is not None and not other and not set(plant.disturbances) & set(program.inputs):
             found[name] = {"unit": plant.output_units[name], "program": program.to_data()}
     return found
 
@@ -171,11 +164,6 @@ def coupling_data(problem: Problem, contracts: Contracts) -> list[dict[str, Any]
         "halvings": HALVINGS,
         "envelope": {"output": stated_output(problem, contracts)},
     }]  # fmt: skip
-
-
-def stated_ultimate(contract: Contract) -> str:
-    """The bound on a member's error that its file states."""
-    return short(contract.certificate.ultimate[0] * (1 + ULTIMATE), up=True)
 
 
 def stated_output(problem: Problem, contracts: Contracts) -> str:

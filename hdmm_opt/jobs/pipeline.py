@@ -115,15 +115,15 @@ def finished(
     if report.records and not shown.missed:
         raise DefectError(f"{report.records}; no file was written, please report this study")
     accepted = report.status == 0 and not shown.missed
-    told = (*notes, _rates(problem, tuned)) if accepted and kept is None else notes
-    parts: list[str] = []
+    parts: tuple[str, ...] = ()
     if accepted and kept is None:
+        notes = (*notes, _rates(problem, tuned))
         progress.stage("contributions")
-        parts += budget_lines(problem, tuned.gains, contracts)
-        parts += contribution_lines(problem, contributions(problem, tuned.gains))
+        shares = contribution_lines(problem, contributions(problem, tuned.gains))
+        parts = (*budget_lines(problem, tuned.gains, contracts), *shares)
     return Design(
         document=proved if accepted else None, report=report, verdicts=tuple(from_checker(report)),
-        missed=shown.missed, gains=tuned.gains, problem=problem, shown=shown, notes=told, parts=tuple(parts),
+        missed=shown.missed, gains=tuned.gains, problem=problem, shown=shown, notes=notes, parts=parts,
     )  # fmt: skip
 
 

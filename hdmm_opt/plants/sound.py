@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from stability.checker import NAME, UNIT_TEXT
+from stability.enclosures.expression import Expression
 
 from ..errors import InvalidInputError
 from .parameter import SOURCES, Parameter
@@ -92,8 +93,8 @@ def _check_limits(plant: Plant) -> None:
             raise _wrong(f"{state} carries out the input and must be in {plant.input_unit}: got {unit}", "convert it")
 
 
-def _check_operations(plant: Plant) -> None:
-    """Nothing that the prover cannot bound, everything stated is read, and every input moves something."""
+def program_of(plant: Plant, value: Any) -> tuple[Expression | None, list[str]]:
+    """A value of a plant as operations over its names, None where that cannot be; and what of them nobody bounds."""
     import casadi as ca
 
     from stability.enclosures.translation import straight_line
@@ -101,13 +102,18 @@ def _check_operations(plant: Plant) -> None:
     inputs = ca.vertcat(plant.x, plant.u, plant.w, plant.p)
     names = (*plant.states, *plant.inputs, *plant.disturbances, *plant.parameters)
     try:
-        program = straight_line(
-            ca.Function("plant", [inputs], [ca.densify(ca.vertcat(plant.mass, plant.force))]), names
-        )
-        other = sorted({operator for operator, *_ in program.operations} - set(BOUNDED))
+        program = straight_line(ca.Function("plant", [inputs], [ca.densify(ca.SX(value))]), names)
     except NotImplementedError:
-        other = ["an operation"]
-    if other:
+        return None, ["an operation"]
+    return program, sorted({operator for operator, *_ in program.operations} - set(BOUNDED))
+
+
+def _check_operations(plant: Plant) -> None:
+    """Nothing that the prover cannot bound, everything stated is read, and every input moves something."""
+    import casadi as ca
+
+    program, other = program_of(plant, ca.vertcat(plant.mass, plant.force))
+    if program is None or other:
         raise _wrong(
             f"the prover bounds + - * / squares, square roots and tanh: got {other[0]}", "rewrite it with those"
         )

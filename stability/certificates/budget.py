@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..loops.deviation import deviation_rows
 from ..loops.model import Bounds
+from ..loops.stack import controller
 from .impulse import Impulse, Search
 from .small_gain import cells_of, closed, small_gain
 
@@ -49,10 +50,10 @@ def budget_of(search: Search, bounds: Bounds, found: Impulse) -> Budget:
     Not guaranteed: proof; the parts are floats beside the certificate.
     """
     rows = deviation_rows(search.model, bounds, search.gains, found.box)
-    cells = []
+    control, cells = controller(search.model, search.gains, rows, bounds.period), []
     for part, known in zip(cells_of(rows, search.split), search.responses, strict=True):
         assert known is not None
-        reads, push = small_gain(part, known.stack, bounds)
+        reads, push = small_gain(part, known.stack, control, bounds)
         n, plain = known.stack.sizes[0], known.plain
         columns = np.hstack([
             plain.rest[:, :n] * push[:n], plain.rest[:, n:] * rows.demand_rate, plain.pulses * push[n:],

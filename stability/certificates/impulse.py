@@ -27,7 +27,7 @@ from ..loops.box import Box, DeviationRows, UnboundedError
 from ..loops.deviation import NOTHING, deviation_rows, first_box, networks, rounded
 from ..loops.model import Bounds, Gains, LoopModel
 from ..loops.responses import Responses, responses
-from ..loops.stack import MAX_DELAY, Stack, controller, delay_of, turn, wiring
+from ..loops.stack import MAX_DELAY, Controller, Stack, controller, delay_of, turn, wiring
 from .certificate import Certificate, Failure
 from .small_gain import COARSE, FINE, Cell, Cut, cell_of, cells_of, closed, late_of, middle_of, small_gain
 
@@ -159,14 +159,14 @@ class Search:
             return Failure(reason=str(error))
 
     def _settled(self, bounds: Bounds) -> Impulse | Failure:
-        known = [r for r in self.responses if r is not None]
-        box, taken = self.box, self.rows
+        summed, box, taken = self.responses, self.box, self.rows
         for _ in range(STEPS):
+            known = [r for r in summed if r is not None]
+            if len(known) < len(summed):
+                return self._unstable(cells_of(taken, self.split)[summed.index(None)], bounds)
             rows = deviation_rows(self.model, bounds, self.gains, box)
-            parts = cells_of(rows, self.split)
-            if len(known) < len(parts):
-                return self._unstable(rows, bounds)
-            found = [self._cell(part, r, bounds, box) for part, r in zip(parts, known, strict=True)]
+            parts, control = cells_of(rows, self.split), controller(self.model, self.gains, rows, bounds.period)
+            found = [self._cell(part, r, control, bounds, box) for part, r in zip(parts, known, strict=True)]
             solved = [entry for entry in found if isinstance(entry, _Bound)]
             if len(solved) < len(found):
                 return next(entry for entry in found if isinstance(entry, Failure))
@@ -176,7 +176,7 @@ class Search:
                 if _moved(taken, rows) <= MOVED:
                     return self._certificate(rows, known, solved, bounds, box)
                 # an adaptive gain has a middle that depends on the box
-                known, taken = [r for r in self._responses(rows, bounds) if r is not None], rows
+                summed, taken = self._responses(rows, bounds), rows
                 continue
             if (needed[0] > self.limit).any():
                 worst = int(np.argmax(needed[0] / self.limit))
@@ -190,12 +190,13 @@ class Search:
         whole = np.max([entry.whole for entry in solved], axis=0)
         return [whole[:n], whole[2 * n : 2 * n + m] + late_of(rows, bounds), whole[2 * n + m :]]
 
-    def _cell(self, rows: DeviationRows, known: Responses, bounds: Bounds, box: Box) -> _Bound | Failure:
+    def _cell(
+        self, rows: DeviationRows, known: Responses, control: Controller, bounds: Bounds, box: Box
+    ) -> _Bound | Failure:
         """The small-gain bounds of one cell."""
         stack = known.stack
         n = stack.sizes[0]
-        control = controller(self.model, self.gains, rows, bounds.period)
-        reads, push = small_gain(rows, replace(stack, control=control), bounds)
+        reads, push = small_gain(rows, stack, control, bounds)
         first = self._start(rows, bounds, box)
         plain = known.plain
         forced = plain.rest[:, :n] @ push[:n] + plain.rest[:, n:] @ rows.demand_rate
@@ -247,10 +248,8 @@ class Search:
             estimates=np.max(np.abs([box.low, box.high]), axis=0) + box.network_bound,
         )  # fmt: skip
 
-    def _unstable(self, rows: DeviationRows, bounds: Bounds) -> Failure:
-        """Why a loop has no summable responses."""
-        kept = zip(cells_of(rows, self.split), self._responses(rows, bounds), strict=True)
-        part = next(part for part, r in kept if r is None)
+    def _unstable(self, part: DeviationRows, bounds: Bounds) -> Failure:
+        """Why the loop of a cell has no summable responses."""
         stack = self._stack(part, bounds)
         poles = np.linalg.eigvals(turn(stack, 1).image[:, : stack.order])
         largest = float(np.max(np.abs(poles)))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..loops.box import Box, DeviationRows
 from ..loops.model import Bounds
 from ..loops.responses import Responses, Sums
-from ..loops.stack import Stack
+from ..loops.stack import Controller, Stack
 from .certificate import Failure
 
 Array = NDArray[np.float64]
@@ -75,15 +75,15 @@ def late_of(rows: DeviationRows, bounds: Bounds) -> Array:
     return (bounds.period + bounds.delay) * rows.drift
 
 
-def small_gain(rows: DeviationRows, stack: Stack, bounds: Bounds) -> tuple[Array, Array]:
-    """S over y = (z, s, v, c), and the known part of what acts: ρ, then pulses."""
+def small_gain(rows: DeviationRows, stack: Stack, ctl: Controller, bounds: Bounds) -> tuple[Array, Array]:
+    """S over y = (z, s, v, c), and the known part of what acts: ρ, then pulses; `ctl` is the controller in the box."""
     n, m, q = stack.sizes
     mass = middle_of(rows)
     change = np.maximum(mass / rows.mass_low - 1, 1 - mass / rows.mass_high)
     per, more = 1 / mass[:, None], (1 + change)[:, None]
     spread = np.maximum(np.abs(rows.low * per - stack.a), np.abs(rows.high * per - stack.a))
     loose = np.maximum(np.abs(rows.input_low * per - stack.b), np.abs(rows.input_high * per - stack.b))
-    ctl, noise = stack.control, np.array(bounds.noise)
+    noise = np.array(bounds.noise)
     reads = np.zeros((n + m + q, 2 * n + m + q))
     reads[:n, :n], reads[:n, n : 2 * n], reads[:n, 2 * n : 2 * n + m] = more * spread, np.diag(change), more * loose
     reads[n : n + m, :n], reads[n : n + m, 2 * n + m :] = ctl.feedback_spread, ctl.network_spread

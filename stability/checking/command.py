@@ -133,13 +133,11 @@ def check_together(
         proved |= {f"member_error.{m.name}": m.claim.ultimate[0] for m in members}
     proved |= beyond_error(data, members, coupling)
     records = ""
-    if not recorded:
-        for row in data["validation"]["requirements"]:
-            row["certified"] = Fraction(repr(above(proved[row["name"]]))) if row["name"] in proved else None
-    required = {
-        row["name"]: (float(row["required"]), above(proved[row["name"]]) if row["name"] in proved else None)
-        for row in data["validation"]["requirements"]
-    }
+    written, required = {name: above(bound) for name, bound in proved.items()}, {}
+    for row in data["validation"]["requirements"]:
+        required[row["name"]] = float(row["required"]), written.get(row["name"])
+        if not recorded:
+            row["certified"] = Fraction(written[row["name"]]) if row["name"] in written else None
     try:
         met(data, proved)
     except UnreadableError as error:

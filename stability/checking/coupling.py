@@ -99,7 +99,7 @@ class Coupling:
         statement = "inside the guarantees the accelerations follow from the loads in one way: the coupling contracts"
         remedy = "less coupling between the members, or more inertia of the actuators"
         made.append(decided("coupling", statement, self._well_posed(), "1", remedy))
-        bound = self.output([member.ultimate for member in self.members])
+        bound = self.output([member.verdict.ultimate(0) for member in self.members])
         if self.stated < bound:
             raise NotProvedError("the envelope states a smaller bound on the output than can be proved")
         settled = upward(self.members[0].claim.transient, 6)

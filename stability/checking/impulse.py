@@ -10,7 +10,7 @@ from __future__ import annotations
 from fractions import Fraction
 from itertools import product
 
-from .arithmetic import WORK, up
+from .arithmetic import WORK, root, up
 from .claim import Cell, Claim
 from .limits import FIXED, NotProvedError
 from .loop import Loop
@@ -151,12 +151,15 @@ class Impulse:
 
     def _after(self, time: Fraction) -> list[Fraction]:
         """Bounds on y from a time on, in units of the box."""
-        periods, found = int(time / self.claim.period), []
-        for cell in self.cells if periods not in self.later else ():
-            left = 1 / _power(cell.cell.growth, periods)
-            parts = zip(cell.forced, cell.amplitude, cell.whole, strict=True)
-            found.append([min(forced + left * start, whole) for forced, start, whole in parts])
-        return self.later.setdefault(periods, [max(column) for column in zip(*found, strict=True)])
+        periods = int(time / self.claim.period)
+        if periods not in self.later:
+            found = []
+            for cell in self.cells:
+                left = 1 / _power(cell.cell.growth, periods)
+                parts = zip(cell.forced, cell.amplitude, cell.whole, strict=True)
+                found.append([min(forced + left * start, whole) for forced, start, whole in parts])
+            self.later[periods] = [max(column) for column in zip(*found, strict=True)]
+        return self.later[periods]
 
     def sizes(self, time: Fraction) -> list[Fraction]:
         """Bounds on |z| and on |v|, as commanded, from a time on."""
@@ -178,6 +181,10 @@ class Impulse:
             return loop.size(name, whole, resting=False)
         moving = self.sizes(claim.rest[1])
         return max(loop.size(name, moving, resting=False), loop.size(name, whole, resting=True))
+
+    def norm(self, signals: list[str]) -> Fraction:
+        """Bound on the norm of inputs as commanded, or of states."""
+        return root(up(sum((self.largest(s) ** 2 for s in signals), Fraction(0))), True)
 
     def speed(self, i: int) -> Fraction:
         """Bound on |z_i'| for all t."""

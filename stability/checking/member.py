@@ -33,7 +33,6 @@ class Member:
     made: list[Obligation]
     reached: tuple[Fraction, Fraction, Fraction] | None
     verdict: Impulse
-    ultimate: Fraction
     used: list[Use]
     failed: str
 
@@ -66,8 +65,7 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     elif seen > claim.half_widths[0]:
         failed = "the recorded simulation leaves the certified envelope"
     tube = tube_of(claim, verdict) if len(claim.rows) > accelerating(claim) else None
-    used = uses(claim, loop, verdict)
-    return Member(claim.name, claim, loop, made, tube, verdict, verdict.ultimate(0), used, failed)
+    return Member(claim.name, claim, loop, made, tube, verdict, uses(claim, loop, verdict), failed)
 
 
 def tube_of(claim: Claim, verdict: Impulse) -> tuple[Fraction, Fraction, Fraction]:

@@ -67,9 +67,9 @@ def below(x: Fraction) -> float:
 
 
 def above(x: Fraction) -> float:
-    """A float whose shortest decimal is not below x."""
+    """A float that is not below x, nor is its shortest decimal."""
     found = float(x)
-    while Fraction(repr(found)) < x:
+    while min(Fraction(found), Fraction(repr(found))) < x:
         found = math.nextafter(found, math.inf)
     return found
 

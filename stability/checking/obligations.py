@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from .arithmetic import root, symmetric, up
+from .arithmetic import symmetric
 from .claim import Claim
 from .effects import effects_of
 from .impulse import Impulse
@@ -21,8 +21,7 @@ def authority(claim: Claim, loop: Loop, verdict: Impulse) -> list[tuple[Fraction
     """Distance of each limited norm from its limit over the certified set; then the stroke."""
     result = []
     for limit in claim.limits:
-        norm = root(up(sum((verdict.largest(s) ** 2 for s in limit["signals"]), Fraction(0))), True)
-        result.append((limit["value"] - norm, str(limit["unit"]), str(limit["name"])))
+        result.append((limit["value"] - verdict.norm(limit["signals"]), str(limit["unit"]), str(limit["name"])))
     position = loop.nodes[claim.rows[0]["state"]].range
     unit = str(claim.rows[0]["unit"])
     result.append((min(position[0] - claim.stroke[0], claim.stroke[1] - position[1]), unit, "stroke"))

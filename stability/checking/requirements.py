@@ -82,11 +82,8 @@ def _settled(data: dict[str, Any], members: list[Member], coupling: Coupling | N
 
 def _voltage(members: list[Member]) -> Fraction | None:
     """The largest certified amplitude of inputs in V."""
-    amplitudes = [
-        root(up(sum((member.verdict.largest(s) ** 2 for s in member.claim.inputs), Fraction(0))), True)
-        for member in members if member.claim.limits[0]["unit"] == "V"
-    ]  # fmt: skip
-    return max(amplitudes, default=None)
+    driven = [member for member in members if member.claim.limits[0]["unit"] == "V"]
+    return max((member.verdict.norm(member.claim.inputs) for member in driven), default=None)
 
 
 def _effort(

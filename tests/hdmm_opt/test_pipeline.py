@@ -9,7 +9,7 @@ from hdmm_opt import study
 from hdmm_opt.errors import DefectError
 from hdmm_opt.files.gain_file import build
 from hdmm_opt.files.seal import prove
-from hdmm_opt.files.sections import short
+from hdmm_opt.files.sections import outputs_data, short
 from hdmm_opt.files.text import write_text
 from hdmm_opt.files.validation import to_data
 from hdmm_opt.jobs import pipeline
@@ -185,3 +185,15 @@ def test_a_file_is_checked_once(monkeypatch):
     data["requirements"].pop("settling_band_m")
     found = pipeline.design(study.validated(data, "test"), Options(), Progress())
     assert found.document is not None and len(count) == 1
+
+
+def test_an_output_that_a_file_cannot_hold_is_left_out():
+    """Operations that are not known, those that nobody bounds, and what a load moves: simulated only."""
+    import casadi as ca
+
+    (member,) = assemble(study.load("emla-p2")).members
+    plant = member.plant
+    for value in (ca.erf(plant.x[2]), ca.exp(plant.x[2]), plant.w[0]):
+        other = replace(member, plant=replace(plant, outputs={**plant.outputs, "torque": value}))
+        assert set(outputs_data(other)) == {"current"}
+    assert set(outputs_data(member)) == {"torque", "current"}

@@ -107,9 +107,7 @@ def test_a_motion_of_too_many_slices_is_simulated_only(document, monkeypatch):
 
 def test_the_rms_of_a_constant_is_its_size(document):
     """A machine that rests at a known torque: the RMS over slices is its peak."""
-    data = checker.parse(json.dumps(document))
-    checker.WORK.begin(checker.MAX_PRODUCTS)
-    member = checker.check_member(data, 0, False)
+    data, member = checker.parse(json.dumps(document)), member_of(document)
     program = {"operations": [["input", "torque_scale"]], "outputs": [0]}
     parts = list(checker._slices(data["members"][0]["reference"]["segments"], member, program))
     high = member.claim.parameters["torque_scale"][1]

@@ -182,21 +182,14 @@ def invented(d):
     next(r for r in d["validation"]["requirements"] if r["name"] == "peak_torque_nm")["certified"] = 60.0
 
 
-def torque_of_nothing(d):
-    """The torque is a number, whatever the machine does."""
-    own(d)["model"]["outputs"]["torque"]["program"] = {
-        "inputs": ["torque_scale"],
-        "operations": [["input", "torque_scale"]],
-        "outputs": [0],
-    }
+def torque_of(name):
+    """The torque is something else, whatever the machine does."""
+    program = {"inputs": [name], "operations": [["input", name]], "outputs": [0]}
 
+    def bend(d):
+        own(d)["model"]["outputs"]["torque"]["program"] = program
 
-def torque_of_the_load(d):
-    own(d)["model"]["outputs"]["torque"]["program"] = {
-        "inputs": ["load_force"],
-        "operations": [["input", "load_force"]],
-        "outputs": [0],
-    }
+    return bend
 
 
 def record(key, value):
@@ -342,8 +335,8 @@ FALSE = {
     "one golden vector twenty times": (same_golden, 2),
     "a requirement that is not met": (unmet, 2),
     "an invented bound on the torque": (invented, 2),
-    "a torque that is a constant": (torque_of_nothing, 2),
-    "a torque of what is no state": (torque_of_the_load, 2),
+    "a torque that is a constant": (torque_of("torque_scale"), 2),
+    "a torque of what is no state": (torque_of("load_force"), 2),
     "another stored statement": (record("statement", "nothing can go wrong"), 1),
     "a larger stored margin": (record("margin", 1e9), 1),
     "another stored unit": (record("unit", "km"), 1),
