@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from hdmm_opt import study
 from hdmm_opt.jobs.certify import certificate, composition
 from hdmm_opt.files.read import read
 from hdmm_opt.files.restore import restored
-from hdmm_opt.problem import GainSet, Problem, assemble
+from hdmm_opt.problem import GainSet, Problem
 from hdmm_opt.simulation import Loop, Run, Scenario
 from stability import Certificate, Gains, Impulse, certify, certify_impulse, checker
 from stability.certificates.impulse import Search
@@ -27,7 +26,6 @@ from known_answers import chain_bounds, claim_of, integrator_chain
 from plain import plain
 from timing import fastest
 
-VALUES = (24.0, 0.0, 1.0, 1.0, 6000.0, 0.0, 1.0, 1.0)
 FILES = Path(__file__).parents[1] / "notebooks" / "gains"
 
 
@@ -39,26 +37,27 @@ def chain(order: int) -> Callable[[], object]:
     return lambda: certify(integrator_chain(order), chain_bounds(order), gains, limit)
 
 
-def scipy_loop(problem: Problem, seconds: float) -> Callable[[], object]:
-    """The same sampled loop, period by period, with SciPy's adaptive integrator on a plain rate function."""
+def scipy_loop(problem: Problem, gains: GainSet, seconds: float) -> Callable[[], object]:
+    """The same sampled loop, a period late, with SciPy's adaptive integrator on a plain rate function."""
     import casadi as ca
 
     (member,) = problem.members
     plant, law, period = member.plant, member.law, member.bounds.period
     rate = plain([plant.x, plant.u, plant.w, plant.p], plant.rate)
     x, r, z = ca.SX.sym("x", len(plant.states)), ca.SX.sym("r", 4), ca.SX.sym("z", law.states)
-    nominal = list(plant.values().values())
-    step = plain([x, r, z], ca.vertcat(*law.step(x, r, z, ca.DM(VALUES), ca.DM(nominal), ca.DM([70e3]), period)[:2]))
+    nominal, values = list(plant.values().values()), gains[member.name]
+    step = plain([x, r, z], ca.vertcat(*law.step(x, r, z, ca.DM(values), ca.DM(nominal), ca.DM([70e3]), period)[:2]))
     reference = member.reference(period * np.arange(round(seconds / period))).T.tolist()
 
     def right(_: float, x: np.ndarray, u: float) -> list[float]:
         return rate([*x.tolist(), u, 76e3, *nominal])
 
     def run() -> None:
-        x, theta = np.array([0.1, 0.0, 0.0]), [0.0, 0.0]
+        x, z, waiting = np.array([0.1, 0.0, 0.0]), law.start([0.0] * 3, values), 0.0
         for r in reference:
-            u, *theta = step([*x.tolist(), *r, *theta])
-            x = solve_ivp(right, (0, period), x, args=(u,), rtol=1e-8, atol=1e-10).y[:, -1]
+            acting = waiting
+            waiting, *z = step([*x.tolist(), *r, *z])
+            x = solve_ivp(right, (0, period), x, args=(acting,), rtol=1e-8, atol=1e-10).y[:, -1]
 
     return run
 
@@ -192,10 +191,10 @@ def alone(name: str, problem: Problem, gains: GainSet) -> list[tuple[str, float]
 
 def main() -> None:
     """Print the tables."""
-    problem = assemble(study.load("emla-p2"))
+    problem, gains = restored(read(FILES / "emla-p2.gains.json"))
     loop, (member,) = Loop(problem), problem.members
     heavy = Scenario(name="heavy", disturbances={"load_force": ((0.0, 76e3),)})
-    run = Run(gains={member.name: VALUES}, scenario=heavy)
+    run = Run(gains=gains, scenario=heavy)
     show(
         "chains of integrators",
         [
@@ -211,8 +210,8 @@ def main() -> None:
         "closed loop, 0.5 s of emla-p2",
         [
             ("compiled", fastest(lambda: loop.figures([run], duration=0.5))),
-            ("SciPy period by period, plain rate function", fastest(scipy_loop(problem, 0.5), 1)),
-            ("certificate at these gains", fastest(lambda: certificate(member, VALUES))),
+            ("SciPy period by period, plain rate function", fastest(scipy_loop(problem, gains, 0.5), 1)),
+            ("certificate at these gains", fastest(lambda: certificate(member, gains[member.name]))),
         ],
     )
 

@@ -82,7 +82,11 @@ turn: One control period of the whole sampled loop: plant, load networks and pen
 
 sums: Integrals over a sub-step, and sums of bounds, in whole numbers rounded up.
 
-  Theorem: ∫|f| <= max(|∫f|, h²/2 sup|f'|), for where f changes its sign it is no larger than the distance from there.
+  Theorem: ∫|f| = |∫f| where f keeps its sign. Where f(z) = 0, |f(r)| is at most the integral of |f'| from z to r, and
+
+      ∫|f| <= ∫_z^h |f'(s)| (h - s) ds + ∫_0^z |f'(s)| s ds,
+
+  with the derivative |f'(z)| (2z - h) by z: it is largest at an end. Must fail: a slope left out.
 
 responses: L1 norms of the impulse responses of a sampled loop.
 
@@ -2132,21 +2136,23 @@ class Loop:
             else:
                 self.disturbance.append(magnitude(self._left(self.closed[i])))
 
-    def _left(self, form: Form) -> Interval:
-        """Range of what is neither a deviation nor an input."""
-        return self.table.over({s: c for s, c in form.items() if s[:1] not in ("Q", "e")})
+    def _left(self, form: Form, known: dict[str, Interval] | None = None) -> Interval:
+        """Range of what is neither a deviation nor an input, where some ranges may be known better."""
+        left = {s: c for s, c in form.items() if s[:1] not in ("Q", "e")}
+        return over(left, {**self.table.ranges, **(known or {})})
 
     def _demanded(self, i: int, raw: Form, rate: Form) -> Fraction:
         """What φ*_i meets of row i, and how fast; returns the disturbance that is left.
 
         Only constant coefficients count: those of the force before nonlinear operations are replaced by what bounds
-        them, and those of the target's rate that are numbers.
+        them, and of those of the target's rate, which may change, their middles.
         """
         claim, table = self.claim, self.table
         place = claim.networks.index(i)
         changes = {f"r{k}": claim.reference[k + 1] for k in range(3)}
         changes |= {f"w:{name}": change for name, (_, change) in claim.feedforward.items()}
-        shift = {s: c for s, c in rate.items() if s in changes and c[0] == c[1]}
+        centres = {s: down((c[0] + c[1]) / 2) for s, c in rate.items() if s in changes}
+        shift = {s: (c, c) for s, c in centres.items()}
         met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[i])))
         middle = {"": (claim.middle[place], claim.middle[place])}
         level = table.over(plus(met, middle))
@@ -2158,7 +2164,7 @@ class Loop:
             raise NotProvedError(f"the load network of row {i + 1} has no effect of a known sign")
         known = {*changes, f"p{i}"} if constant else {*changes}
         rest = table.expand({s: c for s, c in raw.items() if s not in known})
-        late = {s: c for s, c in rate.items() if s not in shift}
+        late = plus(rate, times(shift, neg(ONE)))
         rest = plus(rest, times(late, neg(self.mass[i])), times(middle, neg(ONE)))
         least = drive[0]
         if not constant:  # where the effect of φ̂ may change, φ* is for its middle
@@ -2168,12 +2174,14 @@ class Loop:
             rest = plus({s: c for s, c in rest.items() if s != f"p{i}"},
                         {"": symmetric(around * magnitude(mul(level, inverse(drive))))})  # fmt: skip
         left = magnitude(self._left(rest))
+        # what stands beside a foreseen load is of others that move: at rest it is not there
+        rested = magnitude(self._left(rest, dict.fromkeys((f"d:{name}" for name in claim.feedforward), ZERO)))
         self.demand.append(mul(level, inverse(drive)))
         self.met[i] = plus(met, middle), drive
         still = over(plus(met, middle), {**table.ranges, **self.resting})
         self.resting[f"p{i}"] = mul(still, inverse(drive))
         self.demand_rate.append(up(change / drive[0]))
-        self.settled.append(up(left / least))
+        self.settled.append(up(rested / least))
         return left
 
     def entry(self, i: int, j: int) -> Interval:
@@ -2316,7 +2324,7 @@ def exponential_of(matrix: Matrix) -> Ball:
 # --- turn ---
 
 #: Sub-steps of a period for outputs.
-PHASES = 4
+PHASES = 5
 
 
 def split_of(rows: list[list[Interval]]) -> tuple[Matrix, Matrix]:
@@ -2528,23 +2536,35 @@ def _point(value: Fraction) -> Interval:
 WHOLE = 1 << FIXED
 
 
+def integrals_of(flow: Matrix, length: Fraction) -> tuple[Ball, Ball, Ball]:
+    """exp(flow h), and the integrals of exp(flow r) and of (h - r) exp(flow r) over 0 <= r <= h."""
+    n, step = len(flow), length
+    block = [[*(v * step for v in row), *(step * int(i == j) for j in range(n)), *[Fraction(0)] * n]
+             for i, row in enumerate(flow)]  # fmt: skip
+    block += [[*[Fraction(0)] * 2 * n, *(step * int(i == j) for j in range(n))] for i in range(n)]
+    whole = exponential_of([*block, *([Fraction(0)] * 3 * n for _ in range(n))]).part(slice(0, n), slice(None))
+    first, second, third = (whole.part(slice(None), slice(k * n, (k + 1) * n)) for k in range(3))
+    return first, second, third
+
+
 class Piece:
-    """Rows times exp(flow r) times the sources, integrated over a sub-step: exact areas, and bounds on slopes."""
+    """f = rows times exp(flow r) times the sources over a sub-step: exact areas, and bounds on ∫|f| where f has a zero.
+
+    Entrywise |exp(flow r)| <= exp(least r), and f' = rows flow exp(flow r) sources.
+    """
 
     def __init__(self, turn: Turn, length: Fraction) -> None:
-        size = len(turn.flow)
-        block = [[*(v * length for v in row), *(length * int(i == j) for j in range(size))]
-                 for i, row in enumerate(turn.flow)] + [[Fraction(0)] * (2 * size) for _ in range(size)]  # fmt: skip
-        whole, sources = exponential_of(block), ball(turn.sources)
-        self.forward = whole.part(slice(0, size), slice(0, size))
-        self.area = whole.part(slice(0, size), slice(size, None)) @ sources
-        grown = [[(max(v, Fraction(0)) if i == j else abs(v)) * length for j, v in enumerate(row)]
-                 for i, row in enumerate(turn.flow)]  # fmt: skip
+        flow, sources = turn.flow, ball(turn.sources)
+        self.forward, area, _ = integrals_of(flow, length)
+        self.area = area @ sources
+        least = [[v if i == j else abs(v) for j, v in enumerate(row)] for i, row in enumerate(flow)]
+        _, once, late = integrals_of(least, length)
+        whole = Ball([[v * length.numerator // length.denominator for v in row] for row in once.rows], once.error + 1)
+        self.size, after, before = (times_up(part.sizes(), sources.sizes()) for part in (once, late, whole - late))
+        self.slope = times_up(ball([[abs(v) for v in row] for row in flow]).sizes(), larger(after, before))
+        grown = [[max(v, Fraction(0)) * length if i == j else v * length for j, v in enumerate(row)]
+                 for i, row in enumerate(least)]  # fmt: skip
         self.ceiling = exponential_of(grown).sizes()
-        flow, span = ball([[abs(v) for v in row] for row in turn.flow]).sizes(), (length.numerator << FIXED)
-        span = span // length.denominator + 1
-        self.size = [[(v * span >> FIXED) + 1 for v in row] for row in times_up(self.ceiling, sources.sizes())]
-        self.slope = [[(v * span >> FIXED + 1) + 1 for v in row] for row in times_up(flow, self.size)]
 
     def integral(self, rows: Ball) -> Whole:
         """Bounds on ∫|rows exp(flow r) sources| dr."""
@@ -2612,8 +2632,8 @@ class Weighted:
 
 # --- responses ---
 
-#: Sub-steps of a period for sources, in the first groups and after, and how many groups are first.
-FINE, COARSE, NEAR = 4, 2, 12
+#: Sub-steps of a period for sources.
+PARTS = 3
 #: Grid of the coordinates of a file.
 SHORTER = 1 << 48
 #: Bits that norms are rounded up by, to keep exact inverses short.
@@ -2707,17 +2727,17 @@ class Responses:
         turn, cell, order = self.turn, self.cell, self.turn.order
         fold, start = self.back @ turn.fold, self.back @ turn.begin
         acting = self.back @ turn.image.part(slice(0, order), slice(order, None))
-        fine, coarse = (_Grid(self, self._piece(Fraction(1, c)), fold, c) for c in (FINE, COARSE))
+        grid = _Grid(self, self._piece(Fraction(1, PARTS)), fold)
         apart, start_apart = self.across(self.stepped(acting)), self.across(self.stepped(start))
         row = self.rows.part(slice(None), slice(0, order)) @ self.columns
         blocks, count, first = self._powers(max(cell.groups)), len(row.rows), self.lengths(row)
         rest, felt, begun = (Weighted(count, width) for width in (len(turn.sources), turn.width, len(start.rows[0])))
         weight, weights = WHOLE, self._weights(max(cell.groups))
-        for k, p in enumerate(cell.groups):
+        for p in cell.groups:
             sizes, (power, total) = self.lengths(row), blocks[p]
             summed = through(row, total, self.ends)
             weight = (weight * weights[p] >> FIXED) + 1
-            rest.add((fine if k < NEAR else coarse).integrals(row, summed, sizes, p), weight)
+            rest.add(grid.integrals(row, summed, sizes, p), weight)
             direct, largest = (summed @ acting).sizes(), (row @ start).sizes()
             if p > 1:
                 direct = larger(direct, times_ratio(times_up(sizes, apart), p * (p - 1), 2))
@@ -2727,7 +2747,7 @@ class Responses:
             row = through(row, power, self.ends)
         last = self.lengths(row)
         now, given = self._current(), self.rows.part(slice(None), slice(order, None)).sizes()
-        (area, held), entry = coarse.tail(), self.across(acting)
+        (area, held), entry = grid.tail(), self.across(acting)
         unsure = [[-(-(v.numerator << FIXED) // v.denominator)] for v in turn.started()[1]]
         unknown = self.bounded(times_up(self.back.sizes(), unsure))
         self.sums = []
@@ -2837,10 +2857,10 @@ class Responses:
 class _Grid:
     """Sub-steps of a period for sources, in coordinates y."""
 
-    def __init__(self, responses: Responses, piece: Piece, fold: Ball, count: int) -> None:
+    def __init__(self, responses: Responses, piece: Piece, fold: Ball) -> None:
         self.responses, self.piece = responses, piece
         self.parts: list[tuple[Ball, Ball, Whole]] = []
-        for _ in range(count):
+        for _ in range(PARTS):
             self.parts.append((fold, fold @ piece.area, responses.across(responses.stepped(fold))))
             fold = fold @ piece.forward
 
@@ -3062,15 +3082,12 @@ class Impulse:
     def __init__(self, claim: Claim, loop: Loop) -> None:
         self.claim, self.loop = claim, loop
         for cell in claim.cells:
-            rows, substeps = 5 * (2 * len(claim.rows) + 1), 2 * len(cell.groups) + FINE * NEAR
+            rows, substeps = (PHASES + 1) * (2 * len(claim.rows) + 1), PARTS * len(cell.groups)
             order = len(cell.columns)
             WORK.one(
                 (rows * substeps * order * (len(claim.rows) + 1) + 8 * max(cell.groups) * order + 20 * order**3) // COST
             )
-        cuts = []
-        for (low, high), count in zip(loop.mass, claim.split, strict=True):
-            width = (high - low) / count
-            cuts.append([(low + k * width, low + (k + 1) * width) for k in range(count)])
+        cuts = [parts_of(mass, count) for mass, count in zip(loop.mass, claim.split, strict=True)]
         parts = zip(claim.cells, product(*cuts), strict=True)
         self.cells = [Bounded(Turn(claim, loop, list(masses)), cell) for cell, masses in parts]
         self.later: dict[int, list[Fraction]] = {}
@@ -3143,6 +3160,14 @@ class Impulse:
         """A bound from below on the rate at which what a start makes shrinks, 1/s: ln g >= 2 (g - 1)/(g + 1)."""
         least = min(cell.cell.growth for cell in self.cells)
         return 2 * (least - 1) / (least + 1) / self.claim.period
+
+
+def parts_of(whole: Interval, count: int) -> list[Interval]:
+    """A positive range in parts of about equal ratios that cover it."""
+    low, high = whole
+    ratio = float(high / low)
+    ends = [low, *(min(down(low * Fraction(ratio ** (k / count))), high) for k in range(1, count)), high]
+    return list(pairwise(ends))
 
 
 #: A power that is larger than this counts as this.

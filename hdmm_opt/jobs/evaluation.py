@@ -28,16 +28,17 @@ COST_SCENARIOS = 4
 OBJECTIVES = ("rms error", "certified bound", "effort")
 
 
-def make_evaluator(study: Study, window: Window) -> Callable[[Sequence[Array]], list[Outcome]]:
+def make_evaluator(study: Study, window: Window, refine: bool = False) -> Callable[[Sequence[Array]], list[Outcome]]:
     """The outcomes of a batch of points of a window as a pure function.
 
     Args:
         study: The study.
         window: Where the points lie.
+        refine: Judge them by refined certificates.
     """
     problem = assemble(study)
     loop = Loop(problem)
-    return lambda points: evaluate(loop, [problem.at(window.at(point)) for point in points])
+    return lambda points: evaluate(loop, [problem.at(window.at(point)) for point in points], refine=refine)
 
 
 def evaluate(loop: Loop, candidates: Sequence[GainSet], *, refine: bool = False) -> list[Outcome]:

@@ -24,6 +24,7 @@ from ..problem.verdict import from_checker
 from ..simulation import Loop
 from ..study import Study
 from .certify import longest_period, strongest
+from .condition import condition_lines
 from .contributions import budget_lines, contribution_lines, contributions
 from .falsification import falsify
 from .options import Effort, Options, Progress, effort_of
@@ -63,7 +64,7 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
         tuned = search(problem, tuned, study.tuning.method, budget, seed, options, state, progress)
         if options.full:
             progress.stage("gains: pattern search with refined proofs")
-            tuned = polished(problem, tuned, progress)
+            tuned = polished(problem, tuned, options, progress)
     progress.stage("proof")
     best = strongest(problem, tuned.gains)
     return finished(problem, tuned, best.contracts, effort, options, state, progress, begun, notes=best.notes)
@@ -120,7 +121,8 @@ def finished(
         notes = (*notes, _rates(problem, tuned))
         progress.stage("contributions")
         shares = contribution_lines(problem, contributions(problem, tuned.gains))
-        parts = (*budget_lines(problem, tuned.gains, contracts), *shares)
+        condition = condition_lines(problem, tuned.gains, contracts)
+        parts = (*budget_lines(problem, tuned.gains, contracts), *shares, *condition)
     return Design(
         document=proved if accepted else None, report=report, verdicts=tuple(from_checker(report)),
         missed=shown.missed, gains=tuned.gains, problem=problem, shown=shown, notes=notes, parts=parts,

@@ -49,7 +49,7 @@ class Impulse(Certificate):
         box: Where the model was bounded.
         force: Middle of J. Shape (n, n).
         drive: Middle of B. Shape (n, m).
-        split: Number of equal parts of each inertia's range. Length n.
+        split: Number of parts of equal ratio of each inertia's range. Length n.
         cells: One for each combination of parts, the last index running fastest.
         rates: Bounds on |z_i'|. Shape (n,).
         networks: States of the rows with a load network. Length q.

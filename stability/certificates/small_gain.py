@@ -22,10 +22,10 @@ LARGEST = 0.999
 
 @dataclass(frozen=True)
 class Cut:
-    """How the ranges of the inertias are cut into equal parts.
+    """How the ranges of the inertias are cut into parts of equal ratios.
 
     Attributes:
-        width: Half the width that a part may have, as a share.
+        width: Half the width that a part may have, as a share of its middle.
         most: Parts of one range at most.
         cells: Parts of all ranges together at most.
     """
@@ -36,7 +36,7 @@ class Cut:
 
     def of(self, rows: DeviationRows) -> tuple[int, ...]:
         """Number of parts of each range."""
-        wide = (rows.mass_high / rows.mass_low - 1) / 2
+        wide = np.log(rows.mass_high / rows.mass_low) / 2
         counts = np.clip(np.ceil(wide / self.width), 1, self.most)
         while counts.prod() > self.cells:
             after = np.where(counts > 1, wide / np.maximum(counts - 1, 1), np.inf)
@@ -45,7 +45,7 @@ class Cut:
 
 
 #: For candidates of a search, and for a certificate that is refined.
-COARSE, FINE = Cut(0.06, 2, 4), Cut(0.02, 12, 15)
+COARSE, FINE = Cut(0.1, 4, 4), Cut(0.008, 12, 12)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,12 +97,12 @@ def small_gain(rows: DeviationRows, stack: Stack, ctl: Controller, bounds: Bound
 
 
 def cells_of(rows: DeviationRows, split: tuple[int, ...]) -> list[DeviationRows]:
-    """The enclosures with each inertia's range cut into equal parts, every combination."""
-    low, width = rows.mass_low, (rows.mass_high - rows.mass_low) / np.array(split)
+    """The enclosures with each inertia's range cut into parts of equal ratios, every combination."""
+    low, step = rows.mass_low, (rows.mass_high / rows.mass_low) ** (1 / np.array(split))
     parts = []
     for index in product(*(range(count) for count in split)):
-        begin = low + np.array(index) * width
-        parts.append(replace(rows, mass_low=begin, mass_high=begin + width))
+        begin = low * step ** np.array(index)
+        parts.append(replace(rows, mass_low=begin, mass_high=begin * step))
     return parts
 
 

@@ -8,15 +8,15 @@ smaller box, less of what acts, a faster decay.
 from __future__ import annotations
 
 from fractions import Fraction
-from itertools import product
+from itertools import pairwise, product
 
-from .arithmetic import WORK, root, up
+from .arithmetic import WORK, Interval, down, root, up
 from .claim import Cell, Claim
 from .limits import FIXED, NotProvedError
 from .loop import Loop
 from .matrices import Matrix, Whole, dot
-from .responses import FINE, NEAR, Responses
-from .turn import Turn
+from .responses import PARTS, Responses
+from .turn import PHASES, Turn
 
 #: What a guess is made for is enlarged by this share, so that the exact inequality is strict.
 ROOM = Fraction(1, 1 << 30)
@@ -113,15 +113,12 @@ class Impulse:
     def __init__(self, claim: Claim, loop: Loop) -> None:
         self.claim, self.loop = claim, loop
         for cell in claim.cells:
-            rows, substeps = 5 * (2 * len(claim.rows) + 1), 2 * len(cell.groups) + FINE * NEAR
+            rows, substeps = (PHASES + 1) * (2 * len(claim.rows) + 1), PARTS * len(cell.groups)
             order = len(cell.columns)
             WORK.one(
                 (rows * substeps * order * (len(claim.rows) + 1) + 8 * max(cell.groups) * order + 20 * order**3) // COST
             )
-        cuts = []
-        for (low, high), count in zip(loop.mass, claim.split, strict=True):
-            width = (high - low) / count
-            cuts.append([(low + k * width, low + (k + 1) * width) for k in range(count)])
+        cuts = [parts_of(mass, count) for mass, count in zip(loop.mass, claim.split, strict=True)]
         parts = zip(claim.cells, product(*cuts), strict=True)
         self.cells = [Bounded(Turn(claim, loop, list(masses)), cell) for cell, masses in parts]
         self.later: dict[int, list[Fraction]] = {}
@@ -194,6 +191,14 @@ class Impulse:
         """A bound from below on the rate at which what a start makes shrinks, 1/s: ln g >= 2 (g - 1)/(g + 1)."""
         least = min(cell.cell.growth for cell in self.cells)
         return 2 * (least - 1) / (least + 1) / self.claim.period
+
+
+def parts_of(whole: Interval, count: int) -> list[Interval]:
+    """A positive range in parts of about equal ratios that cover it."""
+    low, high = whole
+    ratio = float(high / low)
+    ends = [low, *(min(down(low * Fraction(ratio ** (k / count))), high) for k in range(1, count)), high]
+    return list(pairwise(ends))
 
 
 #: A power that is larger than this counts as this.

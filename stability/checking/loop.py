@@ -160,21 +160,23 @@ class Loop:
             else:
                 self.disturbance.append(magnitude(self._left(self.closed[i])))
 
-    def _left(self, form: Form) -> Interval:
-        """Range of what is neither a deviation nor an input."""
-        return self.table.over({s: c for s, c in form.items() if s[:1] not in ("Q", "e")})
+    def _left(self, form: Form, known: dict[str, Interval] | None = None) -> Interval:
+        """Range of what is neither a deviation nor an input, where some ranges may be known better."""
+        left = {s: c for s, c in form.items() if s[:1] not in ("Q", "e")}
+        return over(left, {**self.table.ranges, **(known or {})})
 
     def _demanded(self, i: int, raw: Form, rate: Form) -> Fraction:
         """What φ*_i meets of row i, and how fast; returns the disturbance that is left.
 
         Only constant coefficients count: those of the force before nonlinear operations are replaced by what bounds
-        them, and those of the target's rate that are numbers.
+        them, and of those of the target's rate, which may change, their middles.
         """
         claim, table = self.claim, self.table
         place = claim.networks.index(i)
         changes = {f"r{k}": claim.reference[k + 1] for k in range(3)}
         changes |= {f"w:{name}": change for name, (_, change) in claim.feedforward.items()}
-        shift = {s: c for s, c in rate.items() if s in changes and c[0] == c[1]}
+        centres = {s: down((c[0] + c[1]) / 2) for s, c in rate.items() if s in changes}
+        shift = {s: (c, c) for s, c in centres.items()}
         met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[i])))
         middle = {"": (claim.middle[place], claim.middle[place])}
         level = table.over(plus(met, middle))
@@ -186,7 +188,7 @@ class Loop:
             raise NotProvedError(f"the load network of row {i + 1} has no effect of a known sign")
         known = {*changes, f"p{i}"} if constant else {*changes}
         rest = table.expand({s: c for s, c in raw.items() if s not in known})
-        late = {s: c for s, c in rate.items() if s not in shift}
+        late = plus(rate, times(shift, neg(ONE)))
         rest = plus(rest, times(late, neg(self.mass[i])), times(middle, neg(ONE)))
         least = drive[0]
         if not constant:  # where the effect of φ̂ may change, φ* is for its middle
@@ -196,12 +198,14 @@ class Loop:
             rest = plus({s: c for s, c in rest.items() if s != f"p{i}"},
                         {"": symmetric(around * magnitude(mul(level, inverse(drive))))})  # fmt: skip
         left = magnitude(self._left(rest))
+        # what stands beside a foreseen load is of others that move: at rest it is not there
+        rested = magnitude(self._left(rest, dict.fromkeys((f"d:{name}" for name in claim.feedforward), ZERO)))
         self.demand.append(mul(level, inverse(drive)))
         self.met[i] = plus(met, middle), drive
         still = over(plus(met, middle), {**table.ranges, **self.resting})
         self.resting[f"p{i}"] = mul(still, inverse(drive))
         self.demand_rate.append(up(change / drive[0]))
-        self.settled.append(up(left / least))
+        self.settled.append(up(rested / least))
         return left
 
     def entry(self, i: int, j: int) -> Interval:

@@ -15,8 +15,8 @@ from .matrices import Ball, Whole, ball, eye, inverse_of, nothing, times_up
 from .sums import WHOLE, Piece, Weighted, added, larger, length_of, norm_of, scaled_up, through, times_ratio
 from .turn import Turn
 
-#: Sub-steps of a period for sources, in the first groups and after, and how many groups are first.
-FINE, COARSE, NEAR = 4, 2, 12
+#: Sub-steps of a period for sources.
+PARTS = 3
 #: Grid of the coordinates of a file.
 SHORTER = 1 << 48
 #: Bits that norms are rounded up by, to keep exact inverses short.
@@ -110,17 +110,17 @@ class Responses:
         turn, cell, order = self.turn, self.cell, self.turn.order
         fold, start = self.back @ turn.fold, self.back @ turn.begin
         acting = self.back @ turn.image.part(slice(0, order), slice(order, None))
-        fine, coarse = (_Grid(self, self._piece(Fraction(1, c)), fold, c) for c in (FINE, COARSE))
+        grid = _Grid(self, self._piece(Fraction(1, PARTS)), fold)
         apart, start_apart = self.across(self.stepped(acting)), self.across(self.stepped(start))
         row = self.rows.part(slice(None), slice(0, order)) @ self.columns
         blocks, count, first = self._powers(max(cell.groups)), len(row.rows), self.lengths(row)
         rest, felt, begun = (Weighted(count, width) for width in (len(turn.sources), turn.width, len(start.rows[0])))
         weight, weights = WHOLE, self._weights(max(cell.groups))
-        for k, p in enumerate(cell.groups):
+        for p in cell.groups:
             sizes, (power, total) = self.lengths(row), blocks[p]
             summed = through(row, total, self.ends)
             weight = (weight * weights[p] >> FIXED) + 1
-            rest.add((fine if k < NEAR else coarse).integrals(row, summed, sizes, p), weight)
+            rest.add(grid.integrals(row, summed, sizes, p), weight)
             direct, largest = (summed @ acting).sizes(), (row @ start).sizes()
             if p > 1:
                 direct = larger(direct, times_ratio(times_up(sizes, apart), p * (p - 1), 2))
@@ -130,7 +130,7 @@ class Responses:
             row = through(row, power, self.ends)
         last = self.lengths(row)
         now, given = self._current(), self.rows.part(slice(None), slice(order, None)).sizes()
-        (area, held), entry = coarse.tail(), self.across(acting)
+        (area, held), entry = grid.tail(), self.across(acting)
         unsure = [[-(-(v.numerator << FIXED) // v.denominator)] for v in turn.started()[1]]
         unknown = self.bounded(times_up(self.back.sizes(), unsure))
         self.sums = []
@@ -240,10 +240,10 @@ class Responses:
 class _Grid:
     """Sub-steps of a period for sources, in coordinates y."""
 
-    def __init__(self, responses: Responses, piece: Piece, fold: Ball, count: int) -> None:
+    def __init__(self, responses: Responses, piece: Piece, fold: Ball) -> None:
         self.responses, self.piece = responses, piece
         self.parts: list[tuple[Ball, Ball, Whole]] = []
-        for _ in range(count):
+        for _ in range(PARTS):
             self.parts.append((fold, fold @ piece.area, responses.across(responses.stepped(fold))))
             fold = fold @ piece.forward
 

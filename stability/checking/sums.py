@@ -1,6 +1,10 @@
 """Integrals over a sub-step, and sums of bounds, in whole numbers rounded up.
 
-Theorem: ∫|f| <= max(|∫f|, h²/2 sup|f'|), for where f changes its sign it is no larger than the distance from there.
+Theorem: ∫|f| = |∫f| where f keeps its sign. Where f(z) = 0, |f(r)| is at most the integral of |f'| from z to r, and
+
+    ∫|f| <= ∫_z^h |f'(s)| (h - s) ds + ∫_0^z |f'(s)| s ds,
+
+with the derivative |f'(z)| (2z - h) by z: it is largest at an end. Must fail: a slope left out.
 """
 
 from __future__ import annotations
@@ -9,29 +13,41 @@ import math
 from fractions import Fraction
 
 from .limits import FIXED
-from .matrices import Ball, Whole, ball, exponential_of, times_up
+from .matrices import Ball, Matrix, Whole, ball, exponential_of, times_up
 from .turn import Turn
 
 WHOLE = 1 << FIXED
 
 
+def integrals_of(flow: Matrix, length: Fraction) -> tuple[Ball, Ball, Ball]:
+    """exp(flow h), and the integrals of exp(flow r) and of (h - r) exp(flow r) over 0 <= r <= h."""
+    n, step = len(flow), length
+    block = [[*(v * step for v in row), *(step * int(i == j) for j in range(n)), *[Fraction(0)] * n]
+             for i, row in enumerate(flow)]  # fmt: skip
+    block += [[*[Fraction(0)] * 2 * n, *(step * int(i == j) for j in range(n))] for i in range(n)]
+    whole = exponential_of([*block, *([Fraction(0)] * 3 * n for _ in range(n))]).part(slice(0, n), slice(None))
+    first, second, third = (whole.part(slice(None), slice(k * n, (k + 1) * n)) for k in range(3))
+    return first, second, third
+
+
 class Piece:
-    """Rows times exp(flow r) times the sources, integrated over a sub-step: exact areas, and bounds on slopes."""
+    """f = rows times exp(flow r) times the sources over a sub-step: exact areas, and bounds on ∫|f| where f has a zero.
+
+    Entrywise |exp(flow r)| <= exp(least r), and f' = rows flow exp(flow r) sources.
+    """
 
     def __init__(self, turn: Turn, length: Fraction) -> None:
-        size = len(turn.flow)
-        block = [[*(v * length for v in row), *(length * int(i == j) for j in range(size))]
-                 for i, row in enumerate(turn.flow)] + [[Fraction(0)] * (2 * size) for _ in range(size)]  # fmt: skip
-        whole, sources = exponential_of(block), ball(turn.sources)
-        self.forward = whole.part(slice(0, size), slice(0, size))
-        self.area = whole.part(slice(0, size), slice(size, None)) @ sources
-        grown = [[(max(v, Fraction(0)) if i == j else abs(v)) * length for j, v in enumerate(row)]
-                 for i, row in enumerate(turn.flow)]  # fmt: skip
+        flow, sources = turn.flow, ball(turn.sources)
+        self.forward, area, _ = integrals_of(flow, length)
+        self.area = area @ sources
+        least = [[v if i == j else abs(v) for j, v in enumerate(row)] for i, row in enumerate(flow)]
+        _, once, late = integrals_of(least, length)
+        whole = Ball([[v * length.numerator // length.denominator for v in row] for row in once.rows], once.error + 1)
+        self.size, after, before = (times_up(part.sizes(), sources.sizes()) for part in (once, late, whole - late))
+        self.slope = times_up(ball([[abs(v) for v in row] for row in flow]).sizes(), larger(after, before))
+        grown = [[max(v, Fraction(0)) * length if i == j else v * length for j, v in enumerate(row)]
+                 for i, row in enumerate(least)]  # fmt: skip
         self.ceiling = exponential_of(grown).sizes()
-        flow, span = ball([[abs(v) for v in row] for row in turn.flow]).sizes(), (length.numerator << FIXED)
-        span = span // length.denominator + 1
-        self.size = [[(v * span >> FIXED) + 1 for v in row] for row in times_up(self.ceiling, sources.sizes())]
-        self.slope = [[(v * span >> FIXED + 1) + 1 for v in row] for row in times_up(flow, self.size)]
 
     def integral(self, rows: Ball) -> Whole:
         """Bounds on ∫|rows exp(flow r) sources| dr."""

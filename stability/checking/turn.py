@@ -14,7 +14,7 @@ from .loop import Loop
 from .matrices import Ball, Matrix, ball, dot, exponential_of
 
 #: Sub-steps of a period for outputs.
-PHASES = 4
+PHASES = 5
 
 
 def split_of(rows: list[list[Interval]]) -> tuple[Matrix, Matrix]:

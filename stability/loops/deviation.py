@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 
 #: A bound on what is not known yet.
 NOTHING = 1e-9
+#: Steps in which the demand of the load networks settles.
+SETTLING = 4
 #: Gains may be rounded to float32 on their way into a machine; the bounds cover twice that.
 ROUNDED = Interval(1 - 2.0**-22, 1 + 2.0**-22)
 
@@ -53,11 +55,14 @@ def first_box(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], half_w
         half_widths=half_widths, input_bound=np.full(len(model.inputs), NOTHING), low=-capacity, high=capacity,
         middle=np.zeros(len(capacity)), network_bound=np.full(len(capacity), NOTHING),
     )  # fmt: skip
-    for _ in range(3 if len(capacity) else 0):
+    for _ in range(SETTLING if len(capacity) else 0):
         rows = deviation_rows(model, bounds, gains, box)
         # what is left leans to a side until its middle is met too
-        box = replace(_demanding(box, rows), middle=rounded(box.middle + rows.lean))
-    return _demanding(box, deviation_rows(model, bounds, gains, box))
+        following = replace(_demanding(box, rows), middle=rounded(box.middle + rows.lean))
+        if all((getattr(box, key) == getattr(following, key)).all() for key in ("low", "high", "middle")):
+            break
+        box = following
+    return box
 
 
 def _demanding(box: Box, rows: DeviationRows) -> Box:
@@ -179,17 +184,17 @@ class _Builder(Builder):
         """Split row i into what φ*_i meets and what is left.
 
         Only constant coefficients count: those of the force before nonlinear operations are replaced by what bounds
-        them, and those of the target's rate that are numbers.
+        them, and of those of the target's rate, which may change, their middles.
         """
         rates, target = self._rates_of_signals(), self.model.rows[i].target
         moving = term_rates[target] if isinstance(target, int) else Form.of("r1") if target == "reference" else Form()
-        shift = {s: c for s, c in moving.coefficients.items() if c.is_point and s in rates}
+        shift = {s: Interval((c.low + c.high) / 2) for s, c in moving.coefficients.items() if s in rates}
         own = {s: c for s, c in raw.coefficients.items() if s in rates}
         met = Form(own) - Form(shift).scaled(mass)
         drive, constant = self._drive(i, raw, row)
         known = {*own, f"p{i}"} if constant else {*own}
         rest = self.symbols.expand(Form({s: c for s, c in raw.coefficients.items() if s not in known}, raw.constant))
-        late = Form({s: c for s, c in moving.coefficients.items() if s not in shift}, moving.constant)
+        late = moving - Form(shift)
         middle = Form(constant=Interval(float(self.box.middle[self.networks.index(i)])))
         level = self.symbols.range_of(met + middle)
         change = total(c * rates[s] for s, c in met.coefficients.items()).magnitude
@@ -202,9 +207,12 @@ class _Builder(Builder):
         kept = {s: c for s, c in rest.coefficients.items() if s[0] not in "Qe"}
         left = self.symbols.range_of(Form(kept, rest.constant))
         still = over(met + middle, {**self.symbols.ranges, **self._resting()})
+        # what stands beside a foreseen load is of others that move: at rest it is not there
+        alone = dict.fromkeys((f"d:{name}" for name in self.bounds.feedforward), Interval(0.0))
+        rested = over(Form(kept, rest.constant), {**self.symbols.ranges, **alone})
         return _Demand(
             range=level / drive, rate=change / drive.low * (1 + 1e-12), rest=left.magnitude,
-            lean=(left.low + left.high) / 2, settled=left.magnitude / least, resting=still / drive,
+            lean=(left.low + left.high) / 2, settled=rested.magnitude / least, resting=still / drive,
         )  # fmt: skip
 
     def _resting(self) -> dict[str, Interval]:

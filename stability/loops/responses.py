@@ -9,14 +9,15 @@ data; Dahleh and Diaz-Bobillo 1995, ch. 7, for what such norms decide).
 Between the phases of a grid an output is interpolated with h²/8 of its second derivative on top. Sources are summed
 over sub-steps of length h in groups of p periods: where f keeps its sign, Σ∫|f| = |Σ∫f|; where it does not, f is no
 larger than the distance from a zero times its slopes, so Σ∫|f| <= p h ((p-1)/2 sup|Δf| + h/2 sup|f'|) with Δf the
-change from a period to the next. Slopes, and what comes after the last group, are bounded in coordinates in which a
-period contracts every block.
+change from a period to the next, and h²/2 sup|f'| sharpened to the larger of ∫|f'(s)| s ds and ∫|f'(s)| (h - s) ds.
+Changes, and what comes after the last group, are bounded in coordinates in which a period contracts every block.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +27,23 @@ from .stack import Stack, Turn, turn
 
 Array = NDArray[np.float64]
 
-#: Sub-steps of a period for outputs; for sources, in the first periods and after.
-PHASES, FINE, COARSE = 4, 4, 2
-#: Periods with the fine grid; after them a group is this share of the periods before, and of the slowest mode's time.
-NEAR, GROWING, SLOWEST = 12, 0.125, 0.12
+#: Sub-steps of a period for outputs and for sources.
+PHASES, PARTS = 5, 3
+#: A group is at most this share of the periods before it, and of the slowest mode's time.
+GROWING, SLOWEST = 0.125, 0.12
+#: In a group a mode turns by this angle at most, in rad, until it has shrunk to this size.
+TURNED, GONE = 0.15, 0.05
+#: What is smaller counts as this.
+TINY = 1e-9
 #: Largest group.
 LARGEST = 2_000
-#: Periods are summed until what is left is this small, and how many groups at most.
-LEFT, LONGEST = 3e-2, 400
+#: Periods are summed until the slowest mode is this small; the next one where what is left is overestimated
+#: by more than this share of the sums.
+LEFT, LEAST = (0.25, 0.05, 0.01), 0.02
+#: Beside the others, a source of this size has no effect but that of rounding.
+UNFELT = 1e-12
+#: Groups at most.
+LONGEST = 400
 #: Weights of a period in the transient, as powers of the slowest mode.
 SHARES = (0.5, 0.8, 0.93)
 
@@ -88,7 +98,8 @@ def responses(stack: Stack) -> Responses | None:
     one = turn(stack, PHASES)
     order = stack.order
     f = one.image[:, :order]
-    radius = float(np.max(np.abs(np.linalg.eigvals(f))))
+    poles: Any = np.linalg.eigvals(f)
+    radius = float(np.max(np.abs(poles)))
     if not radius < 1 - 1e-9:
         return None
     basis = basis_of(f)
@@ -100,31 +111,48 @@ def responses(stack: Stack) -> Responses | None:
     time = -1 / np.log(min(max(radius, 1e-6), 1 - 1e-12))
     growths = [float(f"{np.exp(share / time):.8e}") for share in SHARES]
     growths = [g for g in growths if reach * g < 1 - 1e-9]
-    return _Sum(stack, one, basis, groups_of(time), growths).made()
+    for left in LEFT:
+        made, share = _Sum(stack, one, basis, groups_of(poles, left), growths).made()
+        if share <= LEAST:
+            break
+    return made
 
 
-def groups_of(time: float) -> tuple[int, ...]:
-    """Numbers of periods that are summed together, for a slowest mode of so many periods."""
-    found, done = [1] * NEAR, NEAR
-    while done < -np.log(LEFT) * time and len(found) < LONGEST:
-        found.append(max(1, int(min(GROWING * done, SLOWEST * time, LARGEST))))
+def groups_of(poles: Any, left: float) -> tuple[int, ...]:
+    """Numbers of periods that are summed together until the slowest mode has a size that is left."""
+    sizes, turns = np.maximum(np.abs(poles), TINY), np.abs(np.angle(poles))
+    time = -1 / np.log(np.max(sizes))
+    found, done = [1], 1
+    while done < -np.log(left) * time and len(found) < LONGEST:
+        turn = np.max(np.where(sizes**done > GONE, turns, 0.0))
+        found.append(max(1, int(min(GROWING * done, SLOWEST * time, TURNED / max(turn, TINY), LARGEST))))
         done += found[-1]
     return tuple(found)
 
 
+def _integrals(flow: Array, length: float) -> tuple[Array, Array, Array]:
+    """exp(flow h), and the integrals of exp(flow r) and of (h - r) exp(flow r) over 0 <= r <= h."""
+    from scipy.linalg import expm
+
+    n = len(flow)
+    block = np.zeros((3 * n, 3 * n))
+    block[:n, :n], block[:n, n : 2 * n], block[n : 2 * n, 2 * n :] = flow, np.eye(n), np.eye(n)
+    whole = np.asarray(expm(block * length), dtype=np.float64)
+    return whole[:n, :n], whole[:n, n : 2 * n], whole[:n, 2 * n :]
+
+
 class _Step:
-    """Integrals of rows · exp(flow r) · sources over a sub-step, and bounds on the slopes."""
+    """Integrals of f = rows · exp(flow r) · sources over a sub-step, and bounds on those of |f| where f has a zero."""
 
     def __init__(self, flow: Array, sources: Array, length: float) -> None:
-        from scipy.linalg import expm
-
-        n = len(flow)
-        block = np.zeros((2 * n, 2 * n))
-        block[:n, :n], block[:n, n:] = flow, np.eye(n)
-        whole = np.asarray(expm(block * length))
-        self.forward, self.area, self.ceiling = whole[:n, :n], whole[:n, n:] @ sources, ceiling(flow, length)
-        self.size = length * (self.ceiling @ np.abs(sources))
-        self.slope = length / 2 * (np.abs(flow) @ self.size)
+        self.forward, area, _ = _integrals(flow, length)
+        self.area, self.ceiling = area @ sources, ceiling(flow, length)
+        # entrywise |exp(flow r)| <= exp(least r), and f' = rows flow exp(flow r) sources
+        least = np.abs(flow)
+        np.fill_diagonal(least, np.diag(flow))
+        _, once, twice = _integrals(least, length)
+        self.size, late = once @ np.abs(sources), twice @ np.abs(sources)
+        self.slope = np.abs(flow) @ np.maximum(late, length * self.size - late)
 
     def integral(self, rows: Array) -> Array:
         """A bound on ∫|rows exp(flow r) sources| dr. Shape (..., sources)."""
@@ -160,8 +188,8 @@ class _Sum:
             self.lengths[length] = _Step(self.flow, self.sources, length)
         return self.lengths[length]
 
-    def made(self) -> Responses:
-        """The sums."""
+    def made(self) -> tuple[Responses, float]:
+        """The sums, and the largest share of those to the first output by which what is left may be overestimated."""
         n, m, q = self.stack.sizes
         order, growths = self.stack.order, [1.0, *self.growths]
         past, totals, after = self._past()
@@ -182,10 +210,13 @@ class _Sum:
                 pulses=self._between(acted[:, : m + q]), noise=self._between(acted[:, m + q :]),
                 begin=self._between(first),
             ))  # fmt: skip
-        return Responses(
+        made = Responses(
             stack=self.stack, basis=self.basis, groups=self.groups, plain=sums[0],
             weighted=dict(zip(self.growths, sums[1:], strict=True)),
         )  # fmt: skip
+        late, signed = self._left(last, 1.0, 1.0)[0][0], self._remainder(after[0])
+        whole = rest[0][0] + late
+        return made, float(np.max((late - np.abs(signed)) / np.maximum(whole, UNFELT * np.max(whole))))
 
     def _past(self) -> tuple[Array, Array, Array]:
         """Rows over y at the start of each group, their sums over each group, and the row after the last."""
@@ -204,18 +235,15 @@ class _Sum:
     def _integrals(self, past: Array, totals: Array, weights: Array) -> Array:
         """Weighted sums of ∫|past fold exp(flow (T - s)) sources| ds over a period, for each row of weights."""
         total = np.zeros((len(weights), past.shape[1], self.sources.shape[1]))
-        counts = np.array(self.groups)
-        for count, chosen in ((FINE, slice(0, NEAR)), (COARSE, slice(NEAR, None))):
-            step = self._step(self.stack.period / count)
-            inward = self.basis.inverse @ self.one.fold
-            sizes, p = self.basis.of_rows(past[chosen]), counts[chosen, None, None]
-            for _ in range(count):
-                change = sizes @ self.basis.of_columns(self.step_back @ inward)
-                sloped = (np.abs(past[chosen] @ inward) + (p - 1) * change) @ step.slope
-                bound = p * (sloped + (p - 1) / 2 * (change @ step.size))
-                found = np.maximum(np.abs(totals[chosen] @ (inward @ step.area)), bound)
-                total += np.tensordot(weights[:, chosen], found, 1)
-                inward = inward @ step.forward
+        step, inward = self._step(self.stack.period / PARTS), self.basis.inverse @ self.one.fold
+        sizes, p = self.basis.of_rows(past), np.array(self.groups)[:, None, None]
+        for _ in range(PARTS):
+            change = sizes @ self.basis.of_columns(self.step_back @ inward)
+            sloped = (np.abs(past @ inward) + (p - 1) * change) @ step.slope
+            bound = p * (sloped + (p - 1) / 2 * (change @ step.size))
+            found = np.maximum(np.abs(totals @ (inward @ step.area)), bound)
+            total += np.tensordot(weights, found, 1)
+            inward = inward @ step.forward
         return total
 
     def _discrete(self, past: Array, totals: Array, weights: Array, count: int) -> tuple[Array, Array]:
@@ -249,11 +277,11 @@ class _Sum:
 
         N^j x <= d for all j where x <= d and N d <= d.
         """
-        basis, step = self.basis, self._step(self.stack.period / COARSE)
+        basis, step = self.basis, self._step(self.stack.period / PARTS)
         norms, last = growth * basis.norms, last * weight
         reach = np.linalg.inv(np.eye(len(basis.blocks)) - norms)
         inward, area = basis.inverse @ self.one.fold, 0.0
-        for _ in range(COARSE):
+        for _ in range(PARTS):
             slopes = basis.of_columns(np.abs(inward) @ step.slope)
             area = area + np.maximum(basis.of_columns(inward @ step.area), slopes)
             inward = inward @ step.forward
@@ -261,6 +289,14 @@ class _Sum:
         begun = acting + reach @ np.maximum(norms @ acting - acting, 0.0)
         size = growth * last @ reach
         return size @ area, size @ acting, last @ begun
+
+    def _remainder(self, row: Array) -> Array:
+        """What comes after the groups to an output, with its signs."""
+        step, inward, area = self._step(self.stack.period / PARTS), self.basis.inverse @ self.one.fold, 0.0
+        for _ in range(PARTS):
+            area = area + inward @ step.area
+            inward = inward @ step.forward
+        return np.linalg.solve(-self.step_back.T, row) @ area
 
     def _between(self, values: Array, *, own: bool = False) -> Array:
         """The largest value over all phases, from both ends of each sub-step, with the curvature between them."""

@@ -5,19 +5,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from known_answers import claim_of, verdict
 from machines import emla, proportional
 
 from hdmm_opt import study
 from hdmm_opt.errors import InvalidInputError
 from hdmm_opt.files.state import State
 from hdmm_opt.files.validation import to_data
-from hdmm_opt.jobs.certify import contracts_of
+from hdmm_opt.jobs import polish
+from hdmm_opt.jobs.certify import certificate, contracts_of
+from hdmm_opt.jobs.condition import condition_lines
 from hdmm_opt.jobs.evaluation import evaluate, make_evaluator
 from hdmm_opt.jobs.gradient import derivatives, descent
 from hdmm_opt.jobs.options import Options, Progress
 from hdmm_opt.jobs.search import search
 from hdmm_opt.jobs.space import Window
-from hdmm_opt.jobs.start import starting_point
+from hdmm_opt.jobs.start import Tuned, starting_point
 from hdmm_opt.jobs.tradeoff import tradeoff
 from hdmm_opt.jobs.validation import validate
 from hdmm_opt.problem import assemble
@@ -116,6 +119,48 @@ def test_the_winner_s_gains_are_short_and_proved(problem, loop):
     assert ours.feasible and ours.cost <= 1.005 * start.cost
     (member,) = problem.members
     assert all(float(f"{found.gains['actuator'][i]:.3g}") == found.gains["actuator"][i] for i in member.searched)
+
+
+def emla_p2(**gains):
+    """The bundled study with some gains, and those gains."""
+    problem = assemble(study.load("emla-p2"))
+    (member,) = problem.members
+    return problem, {member.name: tuple(gains.get(item.name, item.low) for item in member.ranges)}
+
+
+def test_the_last_stage_moves_pairs_of_gains_and_never_for_the_worse(monkeypatch):
+    problem, gains = emla_p2(beta_1=60.0, beta_2=16000.0, gamma_2=3e5)
+    ways = polish.directions(problem)
+    assert len(ways) == 2 * (3 + 2 * 3) and all(np.linalg.norm(way) == pytest.approx(1.0) for way in ways)
+    monkeypatch.setattr(polish, "MOST", 20)
+    contracts = contracts_of(problem, gains, refine=True)
+    first = Tuned(gains=gains, contracts=contracts, evaluations=7, runs=0)
+    found = polish.polished(problem, first, Options(), Progress())
+    before, after = evaluate(Loop(problem), [gains, found.gains], refine=True)
+    assert found.gains != gains and after.rank() < before.rank()
+    assert found.evaluations > 7 + len(ways)
+
+
+def test_a_drive_of_up_to_a_millisecond_is_proved():
+    """emla-p2 a period late with a drive of 0.3 to 1 ms, decided by the checker."""
+    data = emla("emla-p2")
+    data["plant"]["parameters"]["drive_lag"] = {"value": 6.5e-4, "unit": "s", "tolerance": 0.54, "source": "assumed"}
+    (member,) = assemble(study.validated(data, "test")).members
+    _, gains = emla_p2(beta_1=69.3, beta_2=17360.0, gamma_2=3.85e5)
+    values = gains[member.name]
+    assert member.bounds.parameters["drive_lag"].low <= 3e-4 and member.bounds.parameters["drive_lag"].high >= 1e-3
+    found = certificate(member, values, refine=True)
+    claim = claim_of(member.model, member.bounds, member.gains(values), found, limit=74.7, accuracy=2.5e-5)
+    assert verdict(claim)
+    assert not verdict(replace(claim, accuracy=claim.accuracy / 2))
+
+
+def test_the_gain_condition_is_told(problem):
+    (told,) = condition_lines(problem, GAINS, contracts_of(problem, GAINS))
+    assert "decays at" in told and "(position)" in told and "(torque)" in told
+    fast, gains = emla_p2(beta_1=69.3, beta_2=17360.0, gamma_2=3.85e5)
+    (told,) = condition_lines(fast, gains, contracts_of(fast, gains, refine=True))
+    assert told.endswith("none found")
 
 
 def test_a_fault_is_shown_and_counts_for_nothing_else():

@@ -8,6 +8,7 @@ import pytest
 from known_answers import DISTURBANCE, certify_impulse_chain, chain_bounds, claim_of, integrator_chain, verdict
 
 from stability import Bounds, Failure, Gains, Impulse, Interval, LoopModel, Row, certify_impulse, from_casadi
+from stability.loops.deviation import deviation_rows
 
 
 def bound(found):
@@ -65,6 +66,40 @@ def test_near_the_worst_case_and_never_below(bandwidths, spread):
     worst = exact / (1 - spread)  # at the smallest constant gain, the DC gain of an overdamped loop
     found = bound(certify_impulse_chain(bandwidths, period=1e-3, spread=spread))
     assert worst < found < worst * (1.06 if spread == 0 else 1.2)
+
+
+@pytest.mark.parametrize(
+    ("rates", "place", "norm"),
+    [
+        # (1 - s)/(s² + 0.2 s + 1) from -w to x_0
+        (lambda x, w: [-1.2 * x[0] + x[1] - w, -2.2 * x[0] + x[1]], 0, 9.1759),
+        (lambda x, w: [-0.2 * x[0] - x[1] + w, x[0], -x[0] + x[1] - x[2]], 2, 6.4886),
+    ],
+)
+def test_known_norms_of_lightly_damped_systems(rates, place, norm):
+    """Rutland and Lane (1995): L1 norms of systems that next to nothing controls, poles at 1 rad/s and damping 0.1."""
+    order = 2 if place == 0 else 3
+    names = (*(f"x{i}" for i in range(order)), "u", "w")
+    z = ca.SX.sym("z", len(names))
+    moved = rates([z[i] for i in range(order)], z[order + 1])
+    plant = ca.vertcat(*[1.0] * order, moved[0] + z[order], *moved[1:])
+    rows = tuple(Row(state=n, unit="1", target="zero" if k else "reference", controlled=not k)
+                 for k, n in enumerate(names[:order]))  # fmt: skip
+    model = LoopModel(
+        rows=rows, input_map=(0,), inputs=("u",), plant=from_casadi(ca.Function("plant", [z], [plant]), names),
+        law=(from_casadi(ca.Function("term", [ca.SX.sym("r")], [ca.SX(0)]), ("r1",)),),
+    )  # fmt: skip
+    bounds = Bounds(
+        parameters={}, disturbances={"w": Interval(-1.0, 1.0)}, nominal={"w": 0.0}, reference=(Interval(0.0),) * 4,
+        noise=(0.0,) * order, initial=(0.0,) * order, period=0.02,
+    )  # fmt: skip
+    gains = (Gains(beta=1e-9),)
+    found = certify_impulse(model, bounds, gains, np.full(order, 1e3))
+    assert isinstance(found, Impulse)
+    assert norm < found.ultimate[place] < 1.02 * norm
+    assert verdict(claim_of(model, bounds, gains, found))
+    lower = replace(found, ultimate=np.where(np.arange(order) == place, 0.995 * norm, found.ultimate))
+    assert not verdict(claim_of(model, bounds, gains, lower))
 
 
 def test_unstable_rates_are_refused():
@@ -146,6 +181,28 @@ def test_a_delay_of_many_periods_is_refused_at_once():
 
 def test_a_continuous_law_is_no_business_of_this_certificate():
     assert isinstance(certify_impulse_chain((15.0, 100.0)), Failure)
+
+
+def test_what_others_do_is_not_there_while_they_rest():
+    """A load of bounded rate, and beside it what members that move do: a network starts as if that were not there."""
+    model, gains = integrator_chain(2), (Gains(beta=30.0), Gains(beta=200.0, gamma=2e3, capacity=10.0))
+    quiet = replace(
+        chain_bounds(2, period=1e-3), nominal={}, disturbances={"w": Interval(0.0)},
+        feedforward={"w": (Interval.symmetric(0.5), Interval.symmetric(5.0))},
+    )  # fmt: skip
+    loud = replace(quiet, disturbances={"w": Interval.symmetric(0.4)})
+    found = []
+    for bounds in (quiet, loud):
+        certified = certify_impulse(model, bounds, gains, np.array([1.0, 10.0]))
+        assert isinstance(certified, Impulse)
+        rows = deviation_rows(model, bounds, gains, certified.box)
+        claim = claim_of(model, bounds, gains, certified)
+        assert verdict(claim)
+        assert not verdict(replace(claim, ultimate=[0.9 * v for v in claim.ultimate]))
+        found.append((rows.settled, rows.disturbance, certified.ultimate))
+    assert found[0][0] == pytest.approx(found[1][0], abs=1e-9)
+    assert found[0][1][1] < 1e-9 < 0.39 < found[1][1][1]
+    assert found[0][2][0] < found[1][2][0]
 
 
 def near_a_wall(noise):

@@ -248,8 +248,8 @@ def largest_ratio(seed: int, exactly: bool) -> float | None:
 
 @pytest.mark.parametrize("part", range(20))
 def test_no_attack_leaves_the_envelope(part):
-    """Ten loops each, half of them decided by the checker; many are proved, and the attacks come close."""
-    ratios = [r for r in (largest_ratio(10 * part + k, exactly=k % 2 > 0) for k in range(10)) if r is not None]
+    """Ten loops each, a third of them decided by the checker; many are proved, and the attacks come close."""
+    ratios = [r for r in (largest_ratio(10 * part + k, exactly=k % 3 == 1) for k in range(10)) if r is not None]
     assert len(ratios) >= 4
     assert 0.3 < max(ratios) <= 1.0
 
