@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stability import Bounds, LoopModel, first_box
+from stability.loops.box import UnboundedError
 
 from ..control import GainSpec, ProvableLaw
 from ..errors import InvalidInputError
@@ -91,7 +92,10 @@ def preloaded(
             )
     if not found:
         return tuple(ranges)
-    start = first_box(model, bounds, gains, 1e-9 * box)
+    try:
+        start = first_box(model, bounds, gains, 1e-9 * box)
+    except UnboundedError:  # nothing can be proved then, and the search says why
+        return tuple(ranges)
     for k, low, high in zip(found, start.low, start.high, strict=True):
         name = f"preload_{k}"
         if name not in given:

@@ -44,8 +44,9 @@ class Cut:
         return tuple(int(v) for v in counts)
 
 
-#: For candidates of a search, and for a certificate that is refined.
+#: For candidates of a search, and for a certificate that is refined; with more rows the checker takes fewer cells.
 COARSE, FINE = Cut(0.1, 4, 4), Cut(0.008, 12, 12)
+MANY, FEWER = 4, Cut(0.008, 12, 8)
 
 
 @dataclass(frozen=True, kw_only=True)

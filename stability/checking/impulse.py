@@ -197,8 +197,8 @@ def parts_of(whole: Interval, count: int) -> list[Interval]:
     """A positive range in parts of about equal ratios that cover it."""
     low, high = whole
     ratio = float(high / low)
-    ends = [low, *(min(down(low * Fraction(ratio ** (k / count))), high) for k in range(1, count)), high]
-    return list(pairwise(ends))
+    cuts = [down(low * Fraction(ratio ** (k / count))) for k in range(1, count)]
+    return list(pairwise([low, *(min(max(cut, low), high) for cut in cuts), high]))
 
 
 #: A power that is larger than this counts as this.

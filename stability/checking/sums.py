@@ -21,10 +21,10 @@ WHOLE = 1 << FIXED
 
 def integrals_of(flow: Matrix, length: Fraction) -> tuple[Ball, Ball, Ball]:
     """exp(flow h), and the integrals of exp(flow r) and of (h - r) exp(flow r) over 0 <= r <= h."""
-    n, step = len(flow), length
-    block = [[*(v * step for v in row), *(step * int(i == j) for j in range(n)), *[Fraction(0)] * n]
+    n = len(flow)
+    block = [[*(v * length for v in row), *(length * int(i == j) for j in range(n)), *[Fraction(0)] * n]
              for i, row in enumerate(flow)]  # fmt: skip
-    block += [[*[Fraction(0)] * 2 * n, *(step * int(i == j) for j in range(n))] for i in range(n)]
+    block += [[*[Fraction(0)] * 2 * n, *(length * int(i == j) for j in range(n))] for i in range(n)]
     whole = exponential_of([*block, *([Fraction(0)] * 3 * n for _ in range(n))]).part(slice(0, n), slice(None))
     first, second, third = (whole.part(slice(None), slice(k * n, (k + 1) * n)) for k in range(3))
     return first, second, third

@@ -216,7 +216,7 @@ def test_an_actuator_may_lose_what_its_study_allows():
     found, sound = contracts_of(problem, gains), contracts_of(assemble(study.validated(proportional(), "test")), gains)
     (figures,) = Loop(problem).figures([Run(gains=gains, scenario=scenarios(problem)[-1])])
     bound = found["actuator"].certificate.ultimate[0]
-    assert figures.maximum_error_m <= bound and bound > 1.2 * sound["actuator"].certificate.ultimate[0]
+    assert figures.maximum_error_m <= bound and bound > 1.1 * sound["actuator"].certificate.ultimate[0]
     data["plant"]["joints"]["actuator"]["least_effectiveness"] = 0.95
     assert not within_assumptions(assemble(study.validated(data, "test")), scenarios(problem)[-1])
 
@@ -261,9 +261,8 @@ def test_the_integration_error_is_estimated(problem, loop):
 
 
 def test_descent_is_a_method_of_a_design():
-    data = emla("emla-p4-fast")
+    data = proportional()
     data["tuning"] |= {"method": "gradient"}
-    data["plant"].pop("limits")  # where the cascades end at the limit of the torque, nothing is left to descend to
     small = assemble(study.validated(data, "test"))
     first, found = searched(small, "gradient", (10, 3))
     before, after = evaluate(Loop(small), [first.gains, found.gains])

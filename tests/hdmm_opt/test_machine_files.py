@@ -250,7 +250,7 @@ MUTATIONS = {
     _faster_reference: (2, ""), _other_reference: (2, "must rest at"), _noise: (2, ""), _initial: (2, ""), _rate: (1, ""),
     _other_rate: (1, ""), _modelling: (2, ""), _stated_effectiveness: (2, ""), _stated_armature: (2, ""),
     _stated_torque: (1, ""), _gain: (1, ""), _transient: (2, ""), _seen: (1, ""), _observer: (2, ""),
-    _weak_load: (2, "does not enter the plant as its part of the machine's inertia"), _heavier_loads: (1, "load"),
+    _weak_load: (1, "invariance"), _heavier_loads: (1, "load"),
     _load_without_acceleration: (1, "loads"),
     _noise_of_nothing: (2, "names something that the file does not have"),
     _noise_left_out: (2, "does not say noise of speed"), _negative_noise: (2, "must not be negative"),

@@ -158,7 +158,7 @@ def errand(tmp_path_factory):
     return way["moves"], [Motion(move) for move in way["moves"]]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_errand_keeps_every_limit_by_pinocchio(errand):
     """Vias of joints and tool, own limits, a moving start, a path of the tool with its angle, an end that moves."""
     moves, motions = errand

@@ -95,7 +95,7 @@ def run(folder, *arguments):
     return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_sweep_on_a_cluster_that_loses_a_worker_gives_the_same_table(quick, tmp_path):
     """In process, killed and resumed, and on a Dask cluster of two workers of which one is killed on the way."""
     vary = ["--vary", "controller.rate_hz=500:2000:3"]
