@@ -127,6 +127,7 @@ def test_a_file_of_such_a_plant_simulates_as_its_code_does(cylinder, tmp_path):
     assert shown[0] == pytest.approx(shown[1], rel=1e-9)
 
 
+@pytest.mark.long
 def test_the_workers_of_a_search_may_run_the_same_code(tmp_path):
     for name in ("cylinder.py", "cylinder.toml"):
         shutil.copy(EXAMPLE / name, tmp_path / name)
