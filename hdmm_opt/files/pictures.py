@@ -94,10 +94,6 @@ def pictures(document: Mapping[str, Any], problem: Problem, gains: GainSet) -> P
     return Pictures(shown=tuple(shown), sections=sections)
 
 
-def _prefix(problem: Problem, member: Member) -> str:
-    return f"{member.name}: " if len(problem.members) > 1 else ""
-
-
 def _errors(document: Mapping[str, Any], problem: Problem) -> list[Panel]:
     """Errors of the output and of every member, with what is certified and what is required."""
     several, proved, unit = len(problem.members) > 1, not rejected(document), problem.machine.output_unit
@@ -129,7 +125,7 @@ def _bound(certified: float | None, required: float, unit: str, *, signed: bool)
 
 def _limits(problem: Problem, member: Member) -> list[Panel]:
     """Every limited signal, and torque and current where they are only required."""
-    plant, prefix, found = member.plant, _prefix(problem, member), []
+    plant, prefix, found = member.plant, problem.prefix(member), []
     for limit in plant.limits:
         found.append(Panel(
             title=f"{prefix}{limit.name} [{limit.unit}]",
@@ -154,7 +150,7 @@ def _norm(trace: Trace, member: Member, signals: Sequence[str]) -> Array:
 
 def _references(problem: Problem, member: Member) -> list[Panel]:
     """The first state with its reference and the stroke; speed, acceleration and jerk of the reference."""
-    plant, prefix, name = member.plant, _prefix(problem, member), member.name
+    plant, prefix, name = member.plant, problem.prefix(member), member.name
     low, high = plant.stroke
     found = [Panel(
         title=f"{prefix}{plant.states[0]} [{plant.state_units[0]}]", curve=lambda trace: trace.members[name].x[0],

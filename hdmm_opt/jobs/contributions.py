@@ -91,7 +91,7 @@ def budget_lines(problem: Problem, gains: GainSet, contracts: Contracts) -> list
     lines = []
     for member in problem.members:
         bounds, found = contracts[member.name].bounds, contracts[member.name].certificate
-        own, where = member.gains(gains[member.name]), f"{member.name}: " if len(problem.members) > 1 else ""
+        own, where = member.gains(gains[member.name]), problem.prefix(member)
         for fine in (False, True):
             search = begun(member.model, bounds, own, member.box, fine=fine)
             if not isinstance(search, Failure) and search.split == found.split:

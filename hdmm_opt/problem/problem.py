@@ -76,6 +76,10 @@ class Problem:
         """A member by its name."""
         return self.members[self.machine.members.index(name)]
 
+    def prefix(self, member: Member) -> str:
+        """What a line about a member begins with where there are several."""
+        return f"{member.name}: " if len(self.members) > 1 else ""
+
     def disturbance(self, name: str) -> Interval:
         """The assumed range of one of the machine's disturbances."""
         return Interval(*self.study.uncertainty.disturbances[name].range)

@@ -29,20 +29,7 @@ from ..loops.model import Bounds, Gains, LoopModel
 from ..loops.responses import Responses, responses
 from ..loops.stack import MAX_DELAY, Controller, Stack, controller, delay_of, turn, wiring
 from .certificate import Certificate, Failure
-from .small_gain import (
-    COARSE,
-    FEWER,
-    FINE,
-    MANY,
-    Cell,
-    Cut,
-    cell_of,
-    cells_of,
-    closed,
-    late_of,
-    middle_of,
-    small_gain,
-)
+from .small_gain import Cell, Cut, cell_of, cells_of, closed, cut_for, late_of, middle_of, small_gain
 
 Array = NDArray[np.float64]
 
@@ -112,7 +99,7 @@ def begun(
         late = bounds.delay / bounds.period
         return Failure(reason=f"the computing delay is of {late:.3g} periods, {MAX_DELAY} is the limit")
     try:
-        return Search(model, bounds, gains, limit, (FEWER if len(model.rows) > MANY else FINE) if fine else COARSE)
+        return Search(model, bounds, gains, limit, cut_for(len(model.rows), fine=fine))
     except np.linalg.LinAlgError:
         return Failure(reason="the loop has no coordinates in which a period contracts")
     except UnboundedError as error:

@@ -44,9 +44,15 @@ class Cut:
         return tuple(int(v) for v in counts)
 
 
-#: For candidates of a search, and for a certificate that is refined; with more rows the checker takes fewer cells.
-COARSE, FINE = Cut(0.1, 4, 4), Cut(0.008, 12, 12)
-MANY, FEWER = 4, Cut(0.008, 12, 8)
+#: For candidates of a search; for a certificate that is refined, and with more rows, of which the checker takes less.
+COARSE, FINE, FEWER, MANY = Cut(0.1, 4, 4), Cut(0.008, 12, 12), Cut(0.008, 12, 8), 4
+
+
+def cut_for(rows: int, *, fine: bool) -> Cut:
+    """How a loop of so many rows is cut."""
+    if not fine:
+        return COARSE
+    return FEWER if rows > MANY else FINE
 
 
 @dataclass(frozen=True, kw_only=True)

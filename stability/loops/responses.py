@@ -8,9 +8,12 @@ data; Dahleh and Diaz-Bobillo 1995, ch. 7, for what such norms decide).
 
 Between the phases of a grid an output is interpolated with h²/8 of its second derivative on top. Sources are summed
 over sub-steps of length h in groups of p periods: where f keeps its sign, Σ∫|f| = |Σ∫f|; where it does not, f is no
-larger than the distance from a zero times its slopes, so Σ∫|f| <= p h ((p-1)/2 sup|Δf| + h/2 sup|f'|) with Δf the
-change from a period to the next, and h²/2 sup|f'| sharpened to the larger of ∫|f'(s)| s ds and ∫|f'(s)| (h - s) ds.
-Changes, and what comes after the last group, are bounded in coordinates in which a period contracts every block.
+larger than what its slopes make of the distance from a zero,
+
+    Σ∫|f| <= p ( (p-1)/2 ∫|Δf| + max( ∫|f'(s)| s ds, ∫|f'(s)| (h - s) ds ) )
+
+with Δf the change from a period to the next. Changes, and what comes after the last group, are bounded in coordinates
+in which a period contracts every block.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ from numpy.typing import NDArray
 
 from .basis import Basis, basis_of, diagonal
 from .stack import Stack, Turn, turn
+from .substep import SubStep
 
 Array = NDArray[np.float64]
 
@@ -33,7 +37,7 @@ PHASES, PARTS = 5, 3
 GROWING, SLOWEST = 0.125, 0.12
 #: In a group a mode turns by this angle at most, in rad, until it has shrunk to this size.
 TURNED, GONE = 0.15, 0.05
-#: What is smaller counts as this.
+#: A smaller angle counts as this.
 TINY = 1e-9
 #: Largest group.
 LARGEST = 2_000
@@ -84,15 +88,6 @@ class Responses:
     weighted: Mapping[float, Sums]
 
 
-def ceiling(matrix: Array, time: float) -> Array:
-    """Entrywise at least |exp(matrix r)| for 0 <= r <= time."""
-    from scipy.linalg import expm
-
-    size = np.abs(matrix)
-    np.fill_diagonal(size, np.maximum(np.diag(matrix), 0.0))
-    return np.asarray(expm(size * time), dtype=np.float64)
-
-
 def responses(stack: Stack) -> Responses | None:
     """Sum the responses of a loop; None where it is not stable, or contracts in no coordinates that are found."""
     one = turn(stack, PHASES)
@@ -111,17 +106,17 @@ def responses(stack: Stack) -> Responses | None:
     time = -1 / np.log(min(max(radius, 1e-6), 1 - 1e-12))
     growths = [float(f"{np.exp(share / time):.8e}") for share in SHARES]
     growths = [g for g in growths if reach * g < 1 - 1e-9]
+    summation = _Sum(stack, one, basis, growths)
     for left in LEFT:
-        made, share = _Sum(stack, one, basis, groups_of(poles, left), growths).made()
+        made, share = summation.made(groups_of(poles, time, left))
         if share <= LEAST:
             break
     return made
 
 
-def groups_of(poles: Any, left: float) -> tuple[int, ...]:
-    """Numbers of periods that are summed together until the slowest mode has a size that is left."""
-    sizes, turns = np.maximum(np.abs(poles), TINY), np.abs(np.angle(poles))
-    time = -1 / np.log(np.max(sizes))
+def groups_of(poles: Any, time: float, left: float) -> tuple[int, ...]:
+    """Numbers of periods that are summed together until a slowest mode of so many periods has the size `left`."""
+    sizes, turns = np.abs(poles), np.abs(np.angle(poles))
     found, done = [1], 1
     while done < -np.log(left) * time and len(found) < LONGEST:
         turn = np.max(np.where(sizes**done > GONE, turns, 0.0))
@@ -130,44 +125,13 @@ def groups_of(poles: Any, left: float) -> tuple[int, ...]:
     return tuple(found)
 
 
-def _integrals(flow: Array, length: float) -> tuple[Array, Array, Array]:
-    """exp(flow h), and the integrals of exp(flow r) and of (h - r) exp(flow r) over 0 <= r <= h."""
-    from scipy.linalg import expm
-
-    n = len(flow)
-    block = np.zeros((3 * n, 3 * n))
-    block[:n, :n], block[:n, n : 2 * n], block[n : 2 * n, 2 * n :] = flow, np.eye(n), np.eye(n)
-    whole = np.asarray(expm(block * length), dtype=np.float64)
-    return whole[:n, :n], whole[:n, n : 2 * n], whole[:n, 2 * n :]
-
-
-class _Step:
-    """Integrals of f = rows · exp(flow r) · sources over a sub-step, and bounds on those of |f| where f has a zero."""
-
-    def __init__(self, flow: Array, sources: Array, length: float) -> None:
-        self.forward, area, _ = _integrals(flow, length)
-        self.area, self.ceiling = area @ sources, ceiling(flow, length)
-        # entrywise |exp(flow r)| <= exp(least r), and f' = rows flow exp(flow r) sources
-        least = np.abs(flow)
-        np.fill_diagonal(least, np.diag(flow))
-        _, once, twice = _integrals(least, length)
-        self.size, late = once @ np.abs(sources), twice @ np.abs(sources)
-        self.slope = np.abs(flow) @ np.maximum(late, length * self.size - late)
-
-    def integral(self, rows: Array) -> Array:
-        """A bound on ∫|rows exp(flow r) sources| dr. Shape (..., sources)."""
-        return np.maximum(np.abs(rows @ self.area), np.abs(rows) @ self.slope)
-
-
 class _Sum:
-    """One summation."""
+    """A loop of which the sums are taken, whatever periods are summed together."""
 
-    def __init__(
-        self, stack: Stack, one: Turn, basis: Basis, groups: tuple[int, ...], growths: Sequence[float]
-    ) -> None:
-        self.stack, self.one, self.basis, self.groups, self.growths = stack, one, basis, groups, growths
+    def __init__(self, stack: Stack, one: Turn, basis: Basis, growths: Sequence[float]) -> None:
+        self.stack, self.one, self.basis, self.growths = stack, one, basis, growths
         self.flow, self.sources, order = stack.flow(), stack.sources(), stack.order
-        self.lengths: dict[float, _Step] = {}
+        self.lengths: dict[float, SubStep] = {}
         n, m, q = stack.sizes
         self.outputs = 2 * n + m
         self.cx = np.vstack([
@@ -182,27 +146,34 @@ class _Sum:
         self.block = diagonal(inside, basis.blocks)
         self.step_back = self.block - np.eye(order)
         self.acting = basis.inverse @ np.hstack([one.image[:, order:], stack.begin()])
+        self.entry, self.part = basis.of_columns(self.acting), self._step(stack.period / PARTS)
+        # sources of each sub-step of a period in coordinates y, and the same integrated
+        self.inward = [basis.inverse @ one.fold]
+        for _ in range(PARTS - 1):
+            self.inward.append(self.inward[-1] @ self.part.forward)
+        self.areas = [inward @ self.part.area for inward in self.inward]
+        ways = zip(self.inward, self.areas, strict=True)
+        self.tail = sum(np.maximum(*map(basis.of_columns, (area, np.abs(y) @ self.part.slope))) for y, area in ways)
 
-    def _step(self, length: float) -> _Step:
+    def _step(self, length: float) -> SubStep:
         if length not in self.lengths:
-            self.lengths[length] = _Step(self.flow, self.sources, length)
+            self.lengths[length] = SubStep(self.flow, self.sources, length)
         return self.lengths[length]
 
-    def made(self) -> tuple[Responses, float]:
+    def made(self, groups: tuple[int, ...]) -> tuple[Responses, float]:
         """The sums, and the largest share of those to the first output by which what is left may be overestimated."""
         n, m, q = self.stack.sizes
         order, growths = self.stack.order, [1.0, *self.growths]
-        past, totals, after = self._past()
-        done = np.cumsum((0, *self.groups))
+        past, totals, after = self._past(groups)
+        done, counts = np.cumsum((0, *groups)), np.array(groups)[:, None, None]
         # what acts in period P meets period P + k + 1 with weight growth^(k + 1); a group has the weight of its end
         weights = np.array(growths)[:, None] ** done[1:]
-        rest = self._integrals(past, totals, weights)
-        felt, begun = self._discrete(past, totals, weights, m + q + n)
+        rest = self._integrals(counts, past, totals, weights)
+        felt, begun = self._discrete(counts, past, totals, weights, m + q + n)
         now, fixed = self._current(), np.abs(self.rows[:, order:])
         last = self.basis.of_rows(after)
-        sums = []
-        for k, growth in enumerate(growths):
-            left = self._left(last, growth, growth ** float(done[-1]))
+        sums, tails = [], [self._left(last, growth, growth ** float(done[-1])) for growth in growths]
+        for k, left in enumerate(tails):
             acted = fixed + felt[k] + left[1][:, : m + q + n]
             first = np.maximum(begun[k], left[2][:, m + q + n :])
             sums.append(Sums(
@@ -211,44 +182,42 @@ class _Sum:
                 begin=self._between(first),
             ))  # fmt: skip
         made = Responses(
-            stack=self.stack, basis=self.basis, groups=self.groups, plain=sums[0],
+            stack=self.stack, basis=self.basis, groups=groups, plain=sums[0],
             weighted=dict(zip(self.growths, sums[1:], strict=True)),
         )  # fmt: skip
-        late, signed = self._left(last, 1.0, 1.0)[0][0], self._remainder(after[0])
+        late, signed = tails[0][0][0], np.linalg.solve(-self.step_back.T, after[0]) @ sum(self.areas)
         whole = rest[0][0] + late
         return made, float(np.max((late - np.abs(signed)) / np.maximum(whole, UNFELT * np.max(whole))))
 
-    def _past(self) -> tuple[Array, Array, Array]:
+    def _past(self, groups: tuple[int, ...]) -> tuple[Array, Array, Array]:
         """Rows over y at the start of each group, their sums over each group, and the row after the last."""
         order = self.stack.order
         powers, sums = [np.eye(order)], [np.zeros((order, order))]
-        for _ in range(max(self.groups)):
+        for _ in range(max(groups)):
             sums.append(sums[-1] + powers[-1])
             powers.append(powers[-1] @ self.block)
         row, past = self.rows[:, :order] @ self.basis.columns, []
-        for p in self.groups:
+        for p in groups:
             past.append(row)
             row = row @ powers[p]
         first = np.array(past)
-        return first, first @ np.array([sums[p] for p in self.groups]), row
+        return first, first @ np.array([sums[p] for p in groups]), row
 
-    def _integrals(self, past: Array, totals: Array, weights: Array) -> Array:
+    def _integrals(self, p: Array, past: Array, totals: Array, weights: Array) -> Array:
         """Weighted sums of ∫|past fold exp(flow (T - s)) sources| ds over a period, for each row of weights."""
         total = np.zeros((len(weights), past.shape[1], self.sources.shape[1]))
-        step, inward = self._step(self.stack.period / PARTS), self.basis.inverse @ self.one.fold
-        sizes, p = self.basis.of_rows(past), np.array(self.groups)[:, None, None]
-        for _ in range(PARTS):
+        sizes = self.basis.of_rows(past)
+        for inward, area in zip(self.inward, self.areas, strict=True):
             change = sizes @ self.basis.of_columns(self.step_back @ inward)
-            sloped = (np.abs(past @ inward) + (p - 1) * change) @ step.slope
-            bound = p * (sloped + (p - 1) / 2 * (change @ step.size))
-            found = np.maximum(np.abs(totals @ (inward @ step.area)), bound)
-            total += np.tensordot(weights, found, 1)
-            inward = inward @ step.forward
+            sloped = (np.abs(past @ inward) + (p - 1) * change) @ self.part.slope
+            bound = p * (sloped + (p - 1) / 2 * (change @ self.part.size))
+            total += np.tensordot(weights, np.maximum(np.abs(totals @ area), bound), 1)
         return total
 
-    def _discrete(self, past: Array, totals: Array, weights: Array, count: int) -> tuple[Array, Array]:
+    def _discrete(
+        self, p: Array, past: Array, totals: Array, weights: Array, count: int
+    ) -> tuple[Array, Array]:  # fmt: skip
         """Weighted sums of what acts at samples, and the largest of what starts; columns as in `acting`."""
-        p = np.array(self.groups)[:, None, None]
         change = self.basis.of_rows(past) @ self.basis.of_columns(self.step_back @ self.acting)
         summed = np.maximum(
             np.abs(totals @ self.acting[:, :count]), p * (p - 1) / 2 * change[:, :, :count]
@@ -277,26 +246,11 @@ class _Sum:
 
         N^j x <= d for all j where x <= d and N d <= d.
         """
-        basis, step = self.basis, self._step(self.stack.period / PARTS)
-        norms, last = growth * basis.norms, last * weight
-        reach = np.linalg.inv(np.eye(len(basis.blocks)) - norms)
-        inward, area = basis.inverse @ self.one.fold, 0.0
-        for _ in range(PARTS):
-            slopes = basis.of_columns(np.abs(inward) @ step.slope)
-            area = area + np.maximum(basis.of_columns(inward @ step.area), slopes)
-            inward = inward @ step.forward
-        acting = basis.of_columns(self.acting)
-        begun = acting + reach @ np.maximum(norms @ acting - acting, 0.0)
+        norms, last = growth * self.basis.norms, last * weight
+        reach = np.linalg.inv(np.eye(len(self.basis.blocks)) - norms)
+        begun = self.entry + reach @ np.maximum(norms @ self.entry - self.entry, 0.0)
         size = growth * last @ reach
-        return size @ area, size @ acting, last @ begun
-
-    def _remainder(self, row: Array) -> Array:
-        """What comes after the groups to an output, with its signs."""
-        step, inward, area = self._step(self.stack.period / PARTS), self.basis.inverse @ self.one.fold, 0.0
-        for _ in range(PARTS):
-            area = area + inward @ step.area
-            inward = inward @ step.forward
-        return np.linalg.solve(-self.step_back.T, row) @ area
+        return size @ self.tail, size @ self.entry, last @ begun
 
     def _between(self, values: Array, *, own: bool = False) -> Array:
         """The largest value over all phases, from both ends of each sub-step, with the curvature between them."""
