@@ -21,5 +21,6 @@ from .loops.model import Bounds as Bounds
 from .loops.model import Gains as Gains
 from .loops.model import LoopModel as LoopModel
 from .loops.model import Row as Row
+from .loops.observer import Observer as Observer
 from .loops.rows import ErrorRows as ErrorRows
 from .loops.rows import error_rows as error_rows

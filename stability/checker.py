@@ -125,10 +125,6 @@ coupling: What members do to each other.
   (Banach; docs/machine.md). Obligations: guarantees, loads, coupling, output. Must fail: a heavier load, a smaller
   guarantee, a narrower assumption on a load, a smaller bound on the output.
 
-observer: A sampled motion-state observer, bounded by a comparison system of two rows.
-
-  Obligation: observer. Must fail: a slower observer, a worse encoder, another pole.
-
 requirements: What a study requires beside the error, as far as it is proved: settling; peaks and RMS of what drives.
 
   Theorem: an output at a time is its operating point there, with what the deviations are bounded by from that time
@@ -173,8 +169,8 @@ REQUIRED = {
     }
 }  # fmt: skip
 MAX_BYTES, MAX_DIGITS, MAX_EXPONENT, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 2_000_000, 60, 60, 12_000, 8, 1_000
-#: Cells of a certificate, states of a loop with all that it remembers, groups of periods that are summed.
-MAX_CELLS, MAX_ORDER, MAX_GROUPS = 64, 24, 400
+#: Cells of a certificate, states of a loop with all that it remembers and of a block, groups of periods summed.
+MAX_CELLS, MAX_ORDER, MAX_BLOCK, MAX_GROUPS = 64, 24, 4, 400
 #: Largest number of periods in a group, and of periods of delay.
 MAX_GROUP, MAX_DELAY = 2_000, 8
 #: A parameter that may change in a run: faults take effectiveness.
@@ -541,7 +537,7 @@ NONE: Fixed = (0, 0)
 #: What a tanh costs, in products.
 TANH_COST = 300
 #: What a sine and a cosine of one number cost, in products.
-TURN_COST = 20
+TURN_COST = 27
 
 
 def to_fixed(a: Interval) -> Fixed:
@@ -1057,7 +1053,7 @@ STUDY = entry_of(
             "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit},
                                            {"rate": positive}), 8),
             "noise": named(plain_number), "initial": named(plain_number),
-        }),
+        }, {"resolution": named(plain_number)}),
         "reference": entry_of(
             {"kind": some("quintic", "bspline"), "coordinates": some("members"),
              "waypoints": listed(listed(plain_number, 1, MAX_MEMBERS), 2, 50),
@@ -1069,7 +1065,7 @@ STUDY = entry_of(
             {"law": text, "modelling": listed(some(*MODELLING), 0, 8), "rate_hz": plain_number,
              "rates_hz": named(plain_number), "delay_s": share,
              "gains": NOTHING, "members": named(named(RANGE))},
-            {"observer": entry_of(dict.fromkeys(("bandwidth_rad_s", "largest", "epsilon", "sigma"), plain_number))},
+            {"observer": entry_of({}, {"bandwidth_rad_s": plain_number})},
         ),
         "requirements": entry_of(
             {"tracking_error_m": plain_number, "member_error": named(plain_number)},
@@ -1098,7 +1094,7 @@ CERTIFICATE = entry_of(
                                "blocks": listed(whole, 1, MAX_ORDER), "groups": listed(whole, 1, MAX_GROUPS),
                                "growth": ratio}), 1, MAX_CELLS),
      "envelope": entry_of({"rate": ratio, "ultimate": EXACT})},
-    {"guarantee": listed(ratio, 3, 3)},
+    dict.fromkeys(("guarantee", "observed"), listed(ratio, 3, 3)),
 )  # fmt: skip
 MEMBER = entry_of(
     {
@@ -1128,7 +1124,7 @@ MEMBER = entry_of(
             dict.fromkeys(("x", "r", "theta", "phi", "u", "theta_next", "phi_next"), listed(plain_number, 1, MAX_ROWS)),
             {"load": listed(plain_number, 1, 1)}), 20, 100),
     },
-    {"observer": entry_of({"first": plain_number, "second": plain_number, "pole": plain_number})},
+    {"observer": entry_of({"first": plain_number, "second": plain_number})},
 )  # fmt: skip
 COUPLING = entry_of({"members": listed(name, 1, MAX_MEMBERS), "loads": PROGRAM, "place": PROGRAM, "halvings": whole,
                      "envelope": entry_of({"output": ratio})})  # fmt: skip
@@ -1234,6 +1230,13 @@ class Claim:
     feedforward: dict[str, tuple[Interval, Interval]] = field(default_factory=dict)
     first: str = "position"
     rest: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0))
+    observer: tuple[Fraction, ...] = ()
+    shown: list[Fraction] = field(default_factory=list)
+
+    @property
+    def measured(self) -> list[Fraction]:
+        """Bounds on the errors of what the controller knows of the states: measured, or by an observer."""
+        return [*self.shown[:2], *self.noise[2:]] if self.observer else self.noise
 
     @property
     def controlled(self) -> list[int]:
@@ -1265,7 +1268,7 @@ def cell_of(entry: dict[str, Any]) -> Cell:
     """One cell of a certificate; how large it must be is decided where the loop is built."""
     columns = entry["columns"]
     need(isinstance(columns, list) and 1 <= len(columns) <= MAX_ORDER, f"coordinates are of 1 to {MAX_ORDER} states")
-    blocks = [index(v, 3, "a block") for v in entry["blocks"]]
+    blocks = [index(v, MAX_BLOCK + 1, "a block") for v in entry["blocks"]]
     need(min(blocks) >= 1 and sum(blocks) == len(columns), "the blocks do not cover the coordinates")
     groups = [index(v, MAX_GROUP + 1, "a group of periods") for v in entry["groups"]]
     need(1 <= len(groups) <= MAX_GROUPS and min(groups) >= 1, f"1 to {MAX_GROUPS} groups of periods are summed")
@@ -1570,9 +1573,8 @@ def _records(data: dict[str, Any], certified: dict[str, Fraction]) -> None:
         need(ends[0] <= bound, f"a recorded run passes what is proved of {entry['name']}")
         watched = study["controller"].get("observer") is not None
         need(("estimates" in own) == watched, "estimates are recorded where there is an observer, and only there")
-        noise = {a["name"]: a["upper"] for a in entry["assumptions"]}
-        for row, seen in zip(entry["model"]["rows"], own.get("estimates", []), strict=False):
-            inside = number(seen, "an estimate") <= number(noise[f"noise.{row['state']}"], "noise")
+        for seen, bound in zip(own.get("estimates", []), entry["certificate"].get("observed", []), strict=False):
+            inside = number(seen, "an estimate") <= number(bound, "observed")
             need(inside, f"a recorded estimate of {entry['name']} passes what is proved")
     names = [scenario["name"] for scenario in study["validation"]["scenarios"]]
     need([run["name"] for run in shown["scenarios"]] == names, "the recorded scenarios are not those of the study")
@@ -1767,9 +1769,8 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     nominal = {name: number(value, "a nominal value") for name, value in entry["nominal"].items()}
     limits = limits_of(model, section, states)
     check_names(model, plant, terms, assumed, nominal, limits, states)
-    watched = controller.get("observer") is not None
-    need(("observer" in entry) == watched, "members have an observer where the study asks for one, and only there")
     rate = number(controller.get("rates_hz", {}).get(entry["name"], controller["rate_hz"]), "rate_hz")
+    watched = observer_of(controller, entry, rate, terms, rows) if rate > 0 else ()
     transient = number(study["validation"]["transient_s"], "transient_s")
     need(rate > 0 and transient >= 0, "the control rate must be positive, the transient not negative")
     split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]]
@@ -1782,6 +1783,10 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     need([given["row"] for given in networks] == own, "the networks are not those of the gains")
     delay = number(controller["delay_s"], "delay_s")
     need(delay * rate <= MAX_DELAY, f"a computing delay is of at most {MAX_DELAY} periods")
+    need(not watched or gains[0][4] == 0, "a row with an observer has no load network")
+    need(
+        ("observed" in certificate) == bool(watched), "what an observer shows is bounded where there is one, only there"
+    )
     stroke = numbers(stroke_of(section, str(rows[0]["unit"])), 2, "stroke")
     return Claim(
         name=entry["name"], rows=rows, input_map=input_map, inputs=model["inputs"], plant=plant, law=terms,
@@ -1802,7 +1807,31 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
         transient=transient,
         feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
         first=model["first"], rest=rest_of(entry["reference"]["segments"], study["reference"]["dwell_s"]),
+        observer=watched, shown=numbers(certificate["observed"], 3, "observed") if watched else [],
     )  # fmt: skip
+
+
+def observer_of(
+    controller: dict[str, Any], entry: dict[str, Any], rate: Fraction, terms: list[dict[str, Any]],
+    rows: list[dict[str, Any]],
+) -> tuple[Fraction, ...]:  # fmt: skip
+    """l_1 and l_2 of a member's observer, which are those of the study's bandwidth; nothing where it has none."""
+    asked = controller.get("observer")
+    need(("observer" in entry) == (asked is not None), "members have an observer where the study asks for one")
+    if asked is None:
+        return ()
+    first, second = (number(entry["observer"][key], f"the observer's {key}") for key in ("first", "second"))
+    bandwidth = number(asked["bandwidth_rad_s"], "bandwidth_rad_s") if "bandwidth_rad_s" in asked else None
+    need(bandwidth is None or bandwidth > 0, "an observer's bandwidth is positive")
+    away = 1.0 if bandwidth is None else -math.expm1(-float(bandwidth / rate))
+    wanted = away * (2 - away), away**2 * float(rate)
+    close = all(abs(float(g) - w) <= 1e-6 * w for g, w in zip((first, second), wanted, strict=True))
+    need(close and 0 < first <= 1 and second > 0, "the observer's gains are not those of its bandwidth")
+    good = len(rows) > 1 and rows[1]["target"] == 0 and rows[0]["controlled"]
+    need(good, "an observer estimates the first state and the one that answers to it")
+    speed = [terms[0]["operations"][k] for k in terms[0]["outputs"]]
+    need(speed == [["input", "r1"]], "an observer is around the reference: the first modelling term must be its speed")
+    return first, second
 
 
 def rest_of(segments: list[dict[str, Any]], pause: Any) -> tuple[Fraction, Fraction]:
@@ -1914,7 +1943,7 @@ def assumptions(
 ) -> dict[str, dict[str, Interval]]:
     """The assumptions by kind; each must cover what the study states.
 
-    What a coupling does to a member, and what an observer measures, is decided by obligations of their own.
+    What a coupling does to a member is decided by obligations of its own.
     """
     kinds = ("parameter", "disturbance", "noise", "initial", "feedforward", "feedforward_rate")
     found: dict[str, dict[str, Interval]] = {kind: {} for kind in kinds}
@@ -1978,9 +2007,12 @@ def stated_ranges(
             need(state in given, f"the study does not say {kind} of {state}")
             value = number(given[state], f"{kind} of {state}")
             need(value >= 0, f"{kind} of {state} must not be negative")
+            if kind == "noise" and "resolution" in uncertainty:
+                step = number(uncertainty["resolution"].get(state, Fraction(0)), f"the resolution of {state}")
+                need(step >= 0, f"the resolution of {state} must not be negative")
+                value += step / 2
             need(not (kind == "noise" and k == 1 and observed) or value == 0, f"{state} is estimated, not measured")
-            if kind == "initial" or k > 1 or not observed:
-                stated.append((kind, state, -value, value))
+            stated.append((kind, state, -value, value))
     return stated
 
 
@@ -2088,19 +2120,19 @@ class Loop:
 
     def noise(self, i: int) -> Fraction:
         """Bound on the error of the Q_i that the controller computes."""
-        target, own = self.claim.rows[i]["target"], self.claim.noise[i]
+        target, own = self.claim.rows[i]["target"], self.claim.measured[i]
         if isinstance(target, str):
             return own
         return own + up(self.half[target][1] * self.noise(target) + self.term_noise(target))
 
     def term_noise(self, i: int) -> Fraction:
         """What measurement errors make of a modelling term."""
-        shaken = {r["state"]: {"": symmetric(n)} for r, n in zip(self.claim.rows, self.claim.noise, strict=True)}
+        shaken = {r["state"]: {"": symmetric(n)} for r, n in zip(self.claim.rows, self.claim.measured, strict=True)}
         return magnitude(derivative(self.term[i], self._ranges(), shaken).get("", ZERO))
 
     def _ranges(self) -> dict[str, Interval]:
         ranges = {name: node.range for name, node in self.nodes.items()}
-        for row, noise in zip(self.claim.rows, self.claim.noise, strict=True):
+        for row, noise in zip(self.claim.rows, self.claim.measured, strict=True):
             if row["state"] in ranges:
                 ranges[row["state"]] = add(ranges[row["state"]], symmetric(noise))
         return ranges
@@ -2338,18 +2370,22 @@ class Turn:
     """The loop of constant numbers for a part of the inertias' ranges, and what it leaves out.
 
     Everything is in units of the box: z_i of half_widths_i, v_k of input_bound_k, φ̂ - φ* of network_bound_q, time of
-    the period. Z holds z, φ̂ - φ*, and the pending inputs, newest first; columns of maps are over Z, then pulses on the
-    new inputs, pulses on the networks, and measurement errors of the states.
+    the period. Z holds z, φ̂ - φ*, the states of an observer, and the pending inputs, newest first; columns of maps are
+    over Z, then pulses on the new inputs, on the networks and on what the observer sees, and measurement errors of the
+    states.
     """
 
     def __init__(self, claim: Claim, loop: Loop, masses: list[Interval]) -> None:
         self.claim, self.loop = claim, loop
         self.n, self.m, self.q = len(claim.rows), len(claim.inputs), len(claim.networks)
-        self.order = self.n + self.q + self.m * claim.pending
-        self.width = self.m + self.q + self.n
+        self.w = 2 if claim.observer else 0
+        self.first = self.n + self.q + self.w
+        self.order = self.first + self.m * claim.pending
+        self.width = self.m + self.q + self.w + self.n
         self.columns = self.order + self.width
         self._plant(masses)
         self._controller()
+        self._observer()
         self._flow()
         self._phases()
         self._sample()
@@ -2421,6 +2457,29 @@ class Turn:
         self.noise = [up(v / r) for v, r in zip(claim.noise, claim.half_widths, strict=True)]
         self.blur = [up(loop.term_noise(row) / claim.input_bound[k]) for k, row in enumerate(claim.input_map)]
 
+    def _observer(self) -> None:
+        """What the controller sees of z, over the columns; what is bounded of an observer, and rounding of its gains.
+
+        x̂ = ξ + l_1 (y - ξ), ŝ = η + l_2 (y - ξ); bounded are the errors of both, and y - ξ.
+        """
+        claim, unit, noise = self.claim, identity(self.columns), self.columns - self.n
+        self.seen = [_sum(unit[i], unit[noise + i]) for i in range(self.n)]
+        self.shown: Matrix = []
+        self.blind: list[Fraction] = []
+        if not claim.observer:
+            return
+        per = claim.half_widths[0] / claim.half_widths[1]
+        gains, place, pulse = (claim.observer[0], claim.observer[1] * per), self.n + self.q, noise - self.w
+        missed = [v - w for v, w in zip(self.seen[0], unit[place], strict=True)]
+        for i, gain in enumerate(gains):
+            self.seen[i] = _sum(unit[place + i], [gain * v for v in missed], unit[pulse + i])
+        errors = [[v - w for v, w in zip(self.seen[i], unit[i], strict=True)] for i in range(2)]
+        scale = *claim.half_widths[:2], claim.half_widths[0]
+        sizes = [r / bound for r, bound in zip(scale, claim.shown, strict=True)]
+        self.shown = [[v * size for v in row] for row, size in zip([*errors, missed], sizes, strict=True)]
+        self.blind = [up(ROUNDING * gain / sizes[2]) for gain in gains]
+        self.ahead = [[Fraction(1), claim.period / per], [Fraction(0), Fraction(1)]]
+
     def _flow(self) -> None:
         """(z, p)' = flow (z, p) + (b, 0) held; p is what each demand moves since the last sample."""
         claim, n, m, q = self.claim, self.n, self.m, self.q
@@ -2439,15 +2498,18 @@ class Turn:
 
     def held(self, k: int) -> Ball:
         """The input computed k samples ago, over the columns."""
-        n, m, q, order = self.n, self.m, self.q, self.order
-        rows = [[Fraction(0)] * self.columns for _ in range(m)]
-        for i, row in enumerate(rows):
-            if k:
-                row[n + q + m * (k - 1) + i] = Fraction(1)
-                continue
-            row[: n + q], row[order + m + q :] = self.act[i], self.act[i][:n]
-            row[order + i] = Fraction(1)
-        return ball(rows)
+        if k:
+            place = self.first + self.m * (k - 1)
+            return ball([[Fraction(int(c == place + i)) for c in range(self.columns)] for i in range(self.m)])
+        return ball([self._computed(row, self.order + i) for i, row in enumerate(self.act)])
+
+    def _computed(self, row: list[Fraction], own: int) -> list[Fraction]:
+        """What the controller makes of what it sees and of its networks, with a pulse of its own, over the columns."""
+        made = [dot(row[: self.n], column) for column in zip(*self.seen, strict=True)]
+        for j, value in enumerate(row[self.n :]):
+            made[self.n + j] += value
+        made[own] += 1
+        return made
 
     def _phases(self) -> None:
         """(z, p) and the held input at both ends of every sub-step, over the columns."""
@@ -2482,30 +2544,34 @@ class Turn:
         for i in range(n):
             fold[i][i] = Fraction(1)
         for j in range(q):
-            fold[n + j][n + j], kept[n + j][n + j] = Fraction(-1), Fraction(1)
-            for i, value in enumerate(self.learn[j]):
-                kept[n + j][i] += value
-            kept[n + j][order + m + q :] = self.learn[j][:n]
-            kept[n + j][order + m + j] = Fraction(1)
+            fold[n + j][n + j] = Fraction(-1)
+            kept[n + j] = self._computed(self.learn[j], order + m + j)
+            kept[n + j][n + j] += 1
+        for i in range(self.w):
+            kept[n + q + i] = [dot(self.ahead[i], column) for column in zip(*self.seen[:2], strict=True)]
         moved = ball(kept)
         for k in range(claim.pending):
             for i in range(m):
-                fold[n + q + m * k + i][n:] = self.direct[i]
+                fold[self.first + m * k + i][n:] = self.direct[i]
             held = self.held(k)
             for i in range(m):
-                moved.rows[n + q + m * k + i] = held.rows[i]
+                moved.rows[self.first + m * k + i] = held.rows[i]
         self.fold = ball(fold)
         self.image = self.fold @ self.end + moved
         # Z(0) over Q(0), c(0), measurement errors, errors of the modelling terms
         width = 2 * n + q + m
-        begin = [[*row, *([Fraction(0)] * (n + m))] for row in self.start]
-        begin += [[Fraction(int(c == n + j)) for c in range(width)] for j in range(q)]
+        unit = identity(width)
+        begin = [[*row, *[Fraction(0)] * (n + m)] for row in self.start]
+        first = [_sum(row, noise) for row, noise in zip(begin, unit[n + q : 2 * n + q], strict=True)]
+        if self.w:  # an observer starts from the first measurement, and at the reference's speed
+            first[1] = [Fraction(0)] * width
+        begin = [*begin, *unit[n : n + q], *first[: self.w]]
         for _ in range(claim.pending):
-            for k in range(m):
-                row = [sum((self.act[k][i] * self.start[i][c] for i in range(n)), Fraction(0)) for c in range(n + q)]
+            for k, row in enumerate(self.act):
+                made = [dot(row[:n], column) for column in zip(*first, strict=True)]
                 for j in range(q):
-                    row[n + j] += self.act[k][n + j]
-                begin.append([*row, *self.act[k][:n], *(Fraction(int(i == k)) for i in range(m))])
+                    made[n + j] += row[n + j]
+                begin.append(_sum(made, unit[2 * n + q + k]))
         self.begin = ball(begin)
 
     def started(self) -> tuple[list[Fraction], list[Fraction]]:
@@ -2521,10 +2587,14 @@ class Turn:
             first.append(up(max(away, self.loop.settled[j]) / claim.network_bound[j]))
         loose = [dot(row, first) for row in self.start_spread]
         size = [dot(map(abs, row), first) for row in self.start]
-        unsure = [up(v) for v in loose] + [Fraction(0)] * q
+        unsure = [up(v) for v in loose] + [Fraction(0)] * q + [up(v) for v in loose[: self.w]]
         felt = [z + w + noise for z, w, noise in zip(size, loose, self.noise, strict=True)] + first[n:]
         held = [up(dot(map(abs, self.act[k][:n]), loose) + dot(self.act_spread[k], felt)) for k in range(self.m)]
         return [*first, *self.noise, *self.blur], unsure + held * claim.pending
+
+
+def _sum(*rows: list[Fraction]) -> list[Fraction]:
+    return [sum(column, Fraction(0)) for column in zip(*rows, strict=True)]
 
 
 def _point(value: Fraction) -> Interval:
@@ -2586,9 +2656,12 @@ def length_of(values: list[int]) -> int:
 
 
 def norm_of(block: Whole) -> int:
-    """Spectral norm of a block of one or two rows, rounded up."""
+    """Spectral norm of a block of one or two rows, rounded up; of a larger one the bound by its rows and columns."""
     if len(block) == 1:
         return abs(block[0][0])
+    if len(block) > 2:
+        sums = [max(sum(map(abs, line)) for line in way) for way in (block, zip(*block, strict=True))]
+        return math.isqrt(sums[0] * sums[1]) + 1
     (a, b), (c, d) = block
     total, product = a * a + b * b + c * c + d * d, abs(a * d - b * c)
     # the largest σ² is half of t + sqrt(t² - 4 det²)
@@ -2699,7 +2772,7 @@ class Responses:
         return reach, times_up(times_up(reach, missed), reach)
 
     def _instants(self) -> None:
-        """Rows of the outputs (z, s, v) at both ends of every sub-step, each once, and of c."""
+        """Rows of the outputs (z, s, v) at both ends of every sub-step, each once; of c, and of an observer's."""
         turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
         flow = ball([[*row] for row in turn.flow[:n]])
         direct = ball([[Fraction(0)] * n + row for row in turn.direct])
@@ -2719,8 +2792,8 @@ class Responses:
                 ends.append(index[key])
             self.pairs.append((ends[0], ends[1]))
         rows = [row for part in made for row in part.rows]
-        chosen = [[int(c == n + j) << FIXED for c in range(turn.columns)] for j in range(q)]
-        self.rows = Ball([*rows, *chosen], max(part.error for part in made))
+        chosen = ball([*([Fraction(int(c == n + j)) for c in range(turn.columns)] for j in range(q)), *turn.shown])
+        self.rows = Ball([*rows, *chosen.rows], max(chosen.error, *(part.error for part in made)))
 
     def _groups(self) -> None:
         """Everything that acts in earlier periods, group by group; then the tail, and the period of the output."""
@@ -2851,7 +2924,7 @@ class Responses:
             square = -(-((h * h / 8).numerator << FIXED) // (h * h / 8).denominator)
             more = [[(v * square >> FIXED) + 1 for v in row] for row in curved]
             best = larger(best, added(larger(a, b), more))
-        return [*best, *values[len(values) - turn.q :]]
+        return [*best, *values[len(values) - turn.q - len(turn.shown) :]]
 
 
 class _Grid:
@@ -2992,7 +3065,7 @@ ROOM = Fraction(1, 1 << 30)
 
 
 class Bounded:
-    """One cell: what y = (z, s, v, c) reaches, and how fast what a start makes of it shrinks."""
+    """One cell: what y = (z, s, v, c, an observer's) reaches, and how fast what a start makes of it shrinks."""
 
     def __init__(self, turn: Turn, cell: Cell) -> None:
         self.turn, self.cell = turn, cell
@@ -3000,7 +3073,7 @@ class Bounded:
         self.spare = found.spare
         plain, weighted = ([_fractions(part) for part in sums] for sums in found.sums)
         self.reads, pulses = self._reads()
-        n, q, m = turn.n, turn.q, turn.m
+        n, m = turn.n, turn.m
         self.gain = [self._gain(sums) for sums in (plain, weighted)]
         forced = [dot(row[:n], turn.push) + dot(row[n:], turn.moving) for row in plain[0]]
         forced = [v + dot(row, [*pulses, *turn.noise]) for v, row in zip(forced, plain[1], strict=True)]
@@ -3014,30 +3087,32 @@ class Bounded:
         self.rates = [up(s + r + p) for s, r, p in zip(self.whole[n : 2 * n], acted, moved, strict=True)]
         self.inputs = [v + late for v, late in zip(self.whole[2 * n : 2 * n + m], turn.late, strict=True)]
         self.missed = self.whole[2 * n + m :]
-        assert len(self.missed) == q
 
     def _reads(self) -> tuple[Matrix, list[Fraction]]:
-        """S: |ρ| and the pulses on inputs and networks over y; and what of the pulses is known."""
+        """S: |ρ| and the pulses on inputs, networks and an observer over y; and what of the pulses is known."""
         turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
-        nothing = [Fraction(0)] * q
+        nothing = [Fraction(0)] * (q + len(turn.shown))
         reads = []
         for i in range(n):
             more = 1 + turn.change[i]
             row = [more * v for v in turn.a_spread[i]]
             row += [turn.change[i] * int(i == j) for j in range(n)]
             reads.append([*row, *(more * v for v in turn.b_spread[i]), *nothing])
-        known = list(turn.blur) + nothing
+        known = list(turn.blur) + [Fraction(0)] * (q + turn.w)
+        errors = [size / r for size, r in zip(turn.claim.measured, turn.claim.half_widths, strict=True)]
         for k, row in enumerate([*turn.act_spread, *turn.learn_spread]):
-            reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:]])
-            known[k] += dot(row[:n], turn.noise)
+            reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:], *[Fraction(0)] * len(turn.shown)])
+            known[k] += dot(row[:n], errors)
+        for gain in turn.blind:
+            reads.append([*[Fraction(0)] * (len(reads[0]) - 1), gain])
         return [[up(v) for v in row] for row in reads], [up(v) for v in known]
 
     def _gain(self, sums: list[Matrix]) -> Matrix:
         """Λ S."""
-        n, m, q = self.turn.n, self.turn.m, self.turn.q
+        n, count = self.turn.n, self.turn.width - self.turn.n
         columns = list(zip(*self.reads, strict=True))
         return [
-            [up(dot([*rest[:n], *pulses[: m + q]], column)) for column in columns]
+            [up(dot([*rest[:n], *pulses[:count]], column)) for column in columns]
             for rest, pulses in zip(sums[0], sums[1], strict=True)
         ]
 
@@ -3361,6 +3436,7 @@ def vacuity(claim: Claim) -> Fraction:
     """1 where everything that must be positive is, and -1 elsewhere."""
     may_be_zero = [*claim.noise, *claim.initial, claim.delay]
     positive = [claim.period, claim.accuracy, *claim.half_widths, *claim.input_bound, *claim.network_bound]
+    positive += claim.shown
     positive += [limit["value"] for limit in claim.limits] + [claim.stroke[1] - claim.stroke[0]]
     return Fraction(-1 if min(positive) <= 0 or min(may_be_zero) < 0 else 1)
 
@@ -3462,8 +3538,7 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     """Re-prove one member under its own assumptions."""
     entry = data["members"][which]
     claim = read(data, entry, coupled)
-    linked = coupled or data["study"]["controller"].get("observer") is not None
-    need(not (linked and 0 in claim.networks), "a first row with a load network is of a member that nothing links")
+    need(not (coupled and 0 in claim.networks), "a first row with a load network is of a member that nothing links")
     consistent(data, entry, claim)
     follows(data, entry, claim, which)
     well_formed(claim)
@@ -3769,94 +3844,6 @@ def guarantees_kept(data: dict[str, Any], members: list[Member]) -> Obligation:
     return decided("guarantees", statement, min(kept), "1", "a certificate made for these gains")
 
 
-# --- observer ---
-
-@dataclass(frozen=True)
-class Observer:
-    """A sampled motion-state observer with one adaptive scalar, and the coordinates that prove it."""
-
-    first: Fraction
-    second: Fraction
-    largest: Fraction
-    period: Fraction
-    pole: Fraction
-
-    def errors(self, noise: Fraction, acceleration: Fraction, initial: Fraction) -> tuple[Fraction, Fraction]:
-        """Bounds on the errors of position and speed at every sample, for gains as decimal, float64 and float32.
-
-        In y_1 = e_1, y_2 = e_2 + k e_1 the errors obey |y(t + T)| <= A |y| + b; R = (I - A)^-1 b is not left, and
-        neither is any multiple of it that holds the start. For a fixed k each entry is convex in the gains, so it is
-        largest where both are at an end of what rounding makes of them; R grows with every entry.
-        """
-        k = (1 - (1 + self.largest / 2) * self.first - self.pole) / self.period
-        ends = (1 - ROUNDING, 1 + ROUNDING)
-        corners = [self._entries(k, self.first * p, self.second * q, noise) for p in ends for q in ends]
-        a11, a21, b1, b2 = (max(entry) for entry in zip(*corners, strict=True))
-        t = self.period
-        a12, a22 = t, abs(1 + k * t)
-        b1, b2 = b1 + acceleration * t * t / 2, b2 + acceleration * t * (1 + abs(k) * t / 2)
-        determinant = (1 - a11) * (1 - a22) - a12 * a21
-        if not (a11 < 1 and a22 < 1 and determinant > 0):
-            raise NotProvedError("the observer does not contract for every value of its adaptive scalar")
-        reach = [((1 - a22) * b1 + a12 * b2) / determinant, (a21 * b1 + (1 - a11) * b2) / determinant]
-        start = [noise, initial + abs(k) * noise]
-        need(min(reach) > 0, "an observer without any error proves nothing")
-        widest = max(Fraction(1), *(s / r for s, r in zip(start, reach, strict=True)))
-        reach = [up(widest * r) for r in reach]
-        return reach[0], up(reach[1] + abs(k) * reach[0])
-
-    def _entries(self, k: Fraction, first: Fraction, second: Fraction, noise: Fraction) -> tuple[Fraction, ...]:
-        """What depends on the gains: A's first column, and the encoder's part of b."""
-        middle, spread, t = 1 + self.largest / 2, self.largest / 2, self.period
-        inward, factor = second + k * first, (1 + self.largest) * noise
-        a11 = abs(1 - middle * first - k * t) + spread * abs(first)
-        a21 = abs(-middle * inward + k - k * (1 + k * t)) + spread * abs(inward)
-        return a11, a21, factor * abs(first), factor * abs(inward)
-
-
-def observer_of(data: dict[str, Any], member: Member) -> Observer:
-    """The observer of a member: what it is from the study, its gains and the coordinates of its proof from the file."""
-    section = next(m for m in data["members"] if m["name"] == member.name)["observer"]
-    first, second, pole = (number(section[key], f"the observer's {key}") for key in ("first", "second", "pole"))
-    largest = number(data["study"]["controller"]["observer"]["largest"], "the observer's largest")
-    need(first > 0 and second > 0 and largest >= 0, "the observer's gains must be positive")
-    asked = data["study"]["controller"]["observer"]
-    bandwidth = number(asked["bandwidth_rad_s"], "bandwidth_rad_s")
-    need(
-        number(asked["epsilon"], "epsilon") >= 0 and number(asked["sigma"], "sigma") > 0, "an observer adapts forwards"
-    )
-    away = -math.expm1(-float(bandwidth * member.claim.period)) if bandwidth > 0 else 0.0
-    middle = float(1 + largest / 2)
-    wanted = 2 * away / middle, away**2 / (float(member.claim.period) * middle)
-    close = all(abs(float(g) - w) <= 1e-3 * w for g, w in zip((first, second), wanted, strict=True))
-    need(away > 0 and close, "the observer's gains are not those of its bandwidth")
-    return Observer(first, second, largest, member.claim.period, pole)
-
-
-def observed(data: dict[str, Any], members: list[Member]) -> Obligation:
-    """The assumed measurement errors have room for the errors of the observers."""
-    found = []
-    noise = data["study"]["uncertainty"].get("noise", {})
-    for member in members:
-        claim = member.claim
-        encoder = number(noise[claim.rows[0]["state"]], "the encoder's error")
-        need(claim.first == "position", "an observer estimates a position and its rate")
-        acceleration = guarantee_of(data, member.name)[2] + claim.period * magnitude(claim.reference[3])
-        # |v(0) - r'(0)| where |Q_2(0)| and |Q_1(0)| are bounded
-        start = claim.initial[1] + member.loop.gain[0].beta[1] / 2 * claim.initial[0]
-        position, speed = observer_of(data, member).errors(encoder, acceleration, start)
-        found += [room_for(claim.noise[0], position), room_for(claim.noise[1], speed)]
-    statement = "the errors of every observer are inside the assumed measurement errors"
-    return decided("observer", statement, min(found), "1", "an observer that is faster, or a better encoder")
-
-
-def room_for(assumed: Fraction, error: Fraction) -> Fraction:
-    """Room relative to what is assumed; where both are the same number there is room enough."""
-    if assumed < error:
-        return -Fraction(1)
-    return (assumed - error) / assumed + Fraction(1, 10**12) if assumed > 0 else Fraction(1)
-
-
 # --- requirements ---
 
 #: Output -> its unit, and the requirements on its peak and on its RMS.
@@ -4079,6 +4066,7 @@ def check_machine(data: dict[str, Any], file: str, recorded: bool = True) -> Rep
         ("controller.rates_hz", study["controller"].get("rates_hz", {}), set(names)),
         ("requirements.member_error", study["requirements"].get("member_error", {}), set(names)),
         ("uncertainty.noise", study["uncertainty"].get("noise", {}), states),
+        ("uncertainty.resolution", study["uncertainty"].get("resolution", {}), states),
         ("uncertainty.initial", study["uncertainty"].get("initial", {}), states),
     ):
         need(set(given) <= known, f"the study's {where} names something that the file does not have")
@@ -4104,14 +4092,12 @@ def check_machine(data: dict[str, Any], file: str, recorded: bool = True) -> Rep
 def check_together(
     data: dict[str, Any], members: list[Member], made: list[Obligation], file: str, recorded: bool
 ) -> Report:
-    """What joins the members: guarantees, coupling, observers; and the bound on the output."""
+    """What joins the members: guarantees and coupling; and the bound on the output."""
     WORK.begin(MAX_COUPLED)
-    observing = data["study"]["controller"].get("observer") is not None
-    if data["couplings"] or observing:
+    if data["couplings"]:
         made.append(guarantees_kept(data, members))
     coupling = Coupling(data, data["couplings"][0], members) if data["couplings"] else None
     made += coupling.obligations() if coupling is not None else []
-    made += [observed(data, members)] if observing else []
     wrong = [o for o in made if o.verdict != "proved"]
     if wrong:
         text = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"

@@ -1,6 +1,7 @@
 """Loops with known answers, shared by the tests of the verifier."""
 
 from fractions import Fraction
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,7 @@ from stability import (
     Impulse,
     Interval,
     LoopModel,
+    Observer,
     Row,
     certify,
     certify_impulse,
@@ -60,6 +62,7 @@ def chain_bounds(
     unit: float = 1.0,
     disturbance: float = DISTURBANCE,
     delay: float = 0.0,
+    observer: Observer | None = None,
 ) -> Bounds:
     """Constant reference, no noise, |w| <= disturbance, g in 1 ± spread."""
     return Bounds(
@@ -71,10 +74,11 @@ def chain_bounds(
         initial=(0.0,) * order,
         period=period,
         delay=delay,
+        observer=observer,
     )
 
 
-def certify_chain(bandwidths: tuple[float, ...], **assumed: float) -> Composition | Failure:
+def certify_chain(bandwidths: tuple[float, ...], **assumed: Any) -> Composition | Failure:
     """Certificate of an integrator chain with bandwidths ω_i = β_i / 2."""
     order, unit = len(bandwidths), assumed.get("unit", 1.0)
     limit = unit * np.array([0.05, 1.0, 100.0])[:order]
@@ -82,9 +86,7 @@ def certify_chain(bandwidths: tuple[float, ...], **assumed: float) -> Compositio
     return certify(integrator_chain(order, unit=unit), chain_bounds(order, **assumed), gains, limit)
 
 
-def certify_impulse_chain(
-    bandwidths: tuple[float, ...], *, refine: bool = False, **assumed: float
-) -> Impulse | Failure:
+def certify_impulse_chain(bandwidths: tuple[float, ...], *, refine: bool = False, **assumed: Any) -> Impulse | Failure:
     """The same by its impulse responses."""
     order, unit = len(bandwidths), assumed.get("unit", 1.0)
     limit = unit * np.array([0.05, 1.0, 100.0])[:order]
@@ -94,9 +96,9 @@ def certify_impulse_chain(
     )
 
 
-def fraction(value: float) -> Fraction:
+def fraction(value: float, digits: int = 9) -> Fraction:
     """A short rational near a float."""
-    return Fraction(f"{value:.8e}")
+    return Fraction(f"{value:.{digits - 1}e}")
 
 
 def claim_of(
@@ -135,7 +137,12 @@ def claim_of(
         drive=[[fraction(v) for v in row] for row in found.drive],
         split=list(found.split),
         cells=[
-            Cell([[fraction(v) for v in row] for row in c.columns], list(c.blocks), list(c.groups), fraction(c.growth))
+            Cell(
+                [[fraction(v, 17) for v in row] for row in c.columns],
+                list(c.blocks),
+                list(c.groups),
+                fraction(c.growth),
+            )
             for c in found.cells
         ],
         half_widths=[fraction(v) for v in found.half_widths],
@@ -150,6 +157,8 @@ def claim_of(
         transient=Fraction(bounds.transient),
         rest=(Fraction(bounds.rest[0]), Fraction(bounds.rest[1])),
         feedforward={name: (pair(v), pair(rate)) for name, (v, rate) in bounds.feedforward.items()},
+        observer=() if bounds.observer is None else (Fraction(bounds.observer.first), Fraction(bounds.observer.second)),
+        shown=[fraction(v) for v in found.box.shown],
     )
 
 

@@ -1,37 +1,26 @@
-"""The sampled motion-state observer with one adaptive scalar (P-4), as expressions."""
+"""The sampled motion-state observer as expressions; `stability/loops/observer.py` has what it is."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from stability.networks.observer import SampledObserver
+from stability import Observer
 
-#: Discrete states of an observer: x̂, ŝ, θ̂.
-STATES = 3
+#: Discrete states: ξ and η, and the errors of both estimates at the last sample.
+SIZE = 4
 
 
-def observed(
-    observer: SampledObserver, adapting: tuple[float, float], noise: float, estimate: Any, encoder: Any, gain: Any
-) -> Any:
-    """The observer after a period.
+def observed(observer: Observer, period: float, before: Any, error: Any) -> tuple[Any, Any]:
+    """Estimates of position and speed less the reference's, and the observer's states after the period.
 
     Args:
         observer: Its gains.
-        adapting: ε and σ of its adaptive scalar.
-        noise: Bound on the encoder's error, by which its own error is measured.
-        estimate: x̂, ŝ and θ̂ before. Shape (3,).
-        encoder: Measured position.
-        gain: Acceleration of the reference.
+        period: Control period, s.
+        before: ξ and η. Shape (2,).
+        error: Measured position less the reference's.
     """
     import casadi as ca
 
-    epsilon, sigma = adapting
-    t = observer.period
-    error = encoder - estimate[0]
-    factor = (1 + estimate[2]) * error
-    theta = estimate[2] + t * (epsilon * (error / noise) ** 2 / 2 - sigma * estimate[2])
-    return ca.vertcat(
-        estimate[0] + t * estimate[1] + t**2 / 2 * gain + observer.first * factor,
-        estimate[1] + t * gain + observer.second * factor,
-        ca.fmin(ca.fmax(theta, 0), observer.largest),
-    )  # fmt: skip
+    missed = error - before[0]
+    position, speed = before[0] + observer.first * missed, before[1] + observer.second * missed
+    return ca.vertcat(position, speed), ca.vertcat(position + period * speed, speed)

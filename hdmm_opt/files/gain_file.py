@@ -48,7 +48,7 @@ def build(
             "name": member.name,
             "model": model_data(member),
             "nominal": dict(member.bounds.nominal),
-            **({"observer": observer_data(problem, member.name)} if member.name in problem.observers else {}),
+            **observer_data(member),
             "gains": gains_data(member, gains[member.name]),
             "assumptions": assumptions_data(member),
             "reference": reference_data(member.reference, member.plant.reference_units),

@@ -112,9 +112,8 @@ def _same_machine(document: Mapping[str, Any], problem: Problem) -> None:
             dict(member.bounds.nominal),
             entry["nominal"],
         )
-        if member.name in problem.observers:
-            key = f"observer of {member.name}"
-            made[key], given[key] = observer_data(problem, member.name), entry["observer"]
+        key = f"observer of {member.name}"
+        made[key], given[key] = observer_data(member), {k: v for k, v in entry.items() if k == "observer"}
     for part, value in made.items():
         if json.loads(json.dumps(value)) != given[part]:
             raise InvalidInputError(
@@ -166,5 +165,4 @@ def _stated(member: Member, entry: Mapping[str, Any]) -> Bounds:
     return replace(
         member.bounds,
         disturbances={key: ranges[f"disturbance.{key}"] for key in member.bounds.disturbances},
-        noise=tuple(ranges[f"noise.{state}"].high for state in member.plant.states),
     )

@@ -10,7 +10,6 @@ import numpy as np
 
 from stability.networks.contracts import Contract
 from stability.networks.coupling import Tube
-from stability.networks.observer import sampled_bounds
 from trajectories import Reference
 
 from ..motions.slices import HALVINGS
@@ -23,6 +22,8 @@ from ..simulation.requirements import MEMBER
 
 #: Significant digits of the certificate's rationals.
 DIGITS = 9
+#: The same of the coordinates of a cell: rounding must not join what they separate.
+FINER = 15
 #: Guarantees are written with so much room that rounding them does not break them.
 ROOM = 1 + 1e-6
 #: Room of a stated bound on a member's error, and on the output's, over what was found: the checker rounds outwards.
@@ -118,7 +119,7 @@ def certificate_data(contract: Contract) -> dict[str, Any]:
         ],
         "force": _matrix(found.force), "drive": _matrix(found.drive), "split": list(found.split),
         "cells": [
-            {"columns": _matrix(cell.columns), "blocks": list(cell.blocks), "groups": list(cell.groups),
+            {"columns": _matrix(cell.columns, FINER), "blocks": list(cell.blocks), "groups": list(cell.groups),
              "growth": short(cell.growth)}
             for cell in found.cells
         ],
@@ -126,6 +127,8 @@ def certificate_data(contract: Contract) -> dict[str, Any]:
             "rate": short(_rate(contract)), "ultimate": [short(v * (1 + ULTIMATE), up=True) for v in found.ultimate]
         },
     }  # fmt: skip
+    if found.box.shown.size:
+        data["observed"] = [short(v, up=True) for v in found.box.shown]
     if contract.guarantee is not None:
         data["guarantee"] = _tube(contract.guarantee)
     return data
@@ -137,20 +140,18 @@ def _rate(contract: Contract) -> float:
     return RATE * 2 * (least - 1) / (least + 1) / contract.bounds.period
 
 
-def _matrix(rows: np.ndarray) -> list[list[str]]:
-    return [[short(v) for v in row] for row in rows]
+def _matrix(rows: np.ndarray, digits: int = DIGITS) -> list[list[str]]:
+    return [[short(v, digits=digits) for v in row] for row in rows]
 
 
 def _tube(tube: Tube) -> list[str]:
     return [short(ROOM * v, up=True) for v in (tube.position, tube.speed, tube.acceleration)]
 
 
-def observer_data(problem: Problem, name: str) -> dict[str, Any]:
-    """The observer of a member: its gains, and the coordinates that prove it."""
-    observer = problem.observers[name]
-    proof = sampled_bounds(observer, noise=0.0, acceleration=1.0, initial=0.0)
-    assert proof is not None
-    return {"first": observer.first, "second": observer.second, "pole": proof.pole}
+def observer_data(member: Member) -> dict[str, Any]:
+    """The observer of a member, where it has one."""
+    observer = member.bounds.observer
+    return {} if observer is None else {"observer": {"first": observer.first, "second": observer.second}}
 
 
 def coupling_data(problem: Problem, contracts: Contracts) -> list[dict[str, Any]]:
@@ -172,7 +173,7 @@ def stated_output(problem: Problem, contracts: Contracts) -> str:
     return short(output_bound(problem, ultimates) * (1 + OUTPUT) + 1e-12, up=True)
 
 
-def short(value: float, *, up: bool = False) -> str:
-    """A short rational near a float, as "p/q" text; not below it where `up`."""
-    context = Context(prec=DIGITS, rounding=ROUND_CEILING if up else ROUND_HALF_EVEN)
-    return str(Fraction(context.create_decimal(Decimal(float(value)))))
+def short(value: float, *, up: bool = False, digits: int = DIGITS) -> str:
+    """A short rational near a float as it is printed, as "p/q" text; not below it where `up`."""
+    context = Context(prec=digits, rounding=ROUND_CEILING if up else ROUND_HALF_EVEN)
+    return str(Fraction(context.create_decimal(Decimal(repr(float(value))))))

@@ -40,7 +40,8 @@ def exact_text(problem: Problem) -> str:
     for kind, what in (("noise", "measured"), ("initial", "at the start")):
         names = {
             state for m in problem.members
-            for state, value in zip(m.plant.states, getattr(m.bounds, kind), strict=True) if value == 0
+            for state, value in zip(m.plant.states, getattr(m.bounds, kind), strict=True)
+            if value == 0 and not (m.bounds.observer and kind == "noise" and state == m.plant.states[1])
         }  # fmt: skip
         ordered = [
             state for state in dict.fromkeys(s for m in problem.members for s in m.plant.states) if state in names

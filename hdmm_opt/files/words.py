@@ -18,7 +18,6 @@ PLAIN = {
     "loads": "what the members do to each other is inside what each was proved under",
     "coupling": "together the members have one well-defined motion",
     "output": "the error of the tool is inside what the study requires",
-    "observer": "the estimated speeds are good enough",
 }
 
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from stability import Certificate, Composition, Failure, Impulse, certify, certify_impulse
 from stability.networks.contracts import Contract, solve_contracts
-from stability.networks.observer import SampledObserver
 
 from ..problem import GainSet, Member, Problem
+from ..problem.build import observer_at
 from ..problem.margins import HEADROOM, member_margins, violation
 from ..problem.member import Values
 from ..problem.problem import Contracts
@@ -112,8 +112,11 @@ def strongest(problem: Problem, gains: GainSet) -> Strongest:
 def _refinement(member: Member, plain: Contract, better: Contract) -> str:
     unit = member.plant.state_units[0]
     sizes = [1e3 * float(c.certificate.ultimate[0]) for c in (plain, better)]
-    count = len(better.certificate.cells)
-    return f"{member.name}: {sizes[1]:.4g} m{unit} with the inertias in {count} cells, {sizes[0]:.4g} m{unit} in one"
+    counts = [len(c.certificate.cells) for c in (plain, better)]
+    return (
+        f"{member.name}: {sizes[1]:.4g} m{unit} with the inertias in {counts[1]} cells, {sizes[0]:.4g} m{unit} "
+        f"in {counts[0]}"
+    )
 
 
 def longest_period(problem: Problem, gains: GainSet, *, proved: bool = False) -> float:
@@ -125,7 +128,7 @@ def longest_period(problem: Problem, gains: GainSet, *, proved: bool = False) ->
 
     def good(period: float) -> bool:
         slower = at_period(problem, period)
-        return slower is not None and violation(slower, contracts_of(slower, gains), gains) == 0.0
+        return violation(slower, contracts_of(slower, gains), gains) == 0.0
 
     steps = LINKED_STEPS if problem.linked else STEPS
     low = problem.period
@@ -143,19 +146,11 @@ def longest_period(problem: Problem, gains: GainSet, *, proved: bool = False) ->
     return low
 
 
-def at_period(problem: Problem, period: float) -> Problem | None:
-    """The problem at another control period, observers of the same bandwidth; None where one does not contract."""
-    from stability.networks.observer import sampled_bounds
-
-    section, observers = problem.study.controller.observer, {}
-    for name in problem.observers:
-        assert section is not None
-        observer = SampledObserver.of_bandwidth(section.bandwidth_rad_s, section.largest, period)
-        if sampled_bounds(observer, noise=0.0, acceleration=1.0, initial=0.0) is None:
-            return None
-        observers[name] = observer
-    members = tuple(m.under(replace(m.bounds, period=period)) for m in problem.members)
-    return replace(problem, members=members, observers=observers)
+def at_period(problem: Problem, period: float) -> Problem:
+    """The problem at another control period, observers of the same bandwidth."""
+    observer = observer_at(problem.study, period)
+    members = tuple(m.under(replace(m.bounds, period=period, observer=observer)) for m in problem.members)
+    return replace(problem, members=members)
 
 
 def ultimates(contracts: Mapping[str, Contract]) -> np.ndarray:

@@ -141,6 +141,11 @@ def _estimated(
     if not watched:
         return []
     return [
-        (f"the estimate of {name}'s {what}", max(column), contract.bounds.noise[k], unit + ("/s" if k else ""))
+        (
+            f"the estimate of {name}'s {what}",
+            max(column),
+            float(contract.certificate.box.shown[k]),
+            unit + ("/s" if k else ""),
+        )
         for k, (what, column) in enumerate(zip(("position", "speed"), zip(*watched, strict=True), strict=True))
     ]

@@ -7,20 +7,28 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from stability import Bounds, Interval
+from stability import Bounds, Interval, Observer
 from stability.networks.coupling import Slices
-from stability.networks.observer import SampledObserver, sampled_bounds
 from trajectories import Reference
 
 from ..control.registry import law_for
-from ..errors import InvalidInputError, refuse
+from ..errors import refuse
 from ..machines.machine import Machine
 from ..machines.registry import model
 from ..motions.references import references as made_references
 from ..motions.slices import sliced
 from ..plants import Parameter, Plant
 from ..study import Study
-from .fit import check_disturbances, check_motion, check_rates, check_scenarios, check_shared, check_states, state_key
+from .fit import (
+    check_disturbances,
+    check_motion,
+    check_observer,
+    check_rates,
+    check_scenarios,
+    check_shared,
+    check_states,
+    state_key,
+)
 from .gains import gain_ranges, preloaded
 from .member import Member
 from .problem import Problem
@@ -42,15 +50,18 @@ def assemble(study: Study, references: tuple[Reference, ...] | None = None) -> P
         InvalidInputError: an unreachable reference, or sections that do not fit each other.
     """
     machine = model(study.plant.model).build(study.plant)
-    sections = {"noise": study.uncertainty.noise, "initial": study.uncertainty.initial}
+    uncertainty = study.uncertainty
+    sections = {"noise": uncertainty.noise, "resolution": uncertainty.resolution, "initial": uncertainty.initial}
     refuse([
         *check_disturbances(study, machine), *check_scenarios(study, machine), *check_rates(study, machine),
         *(error for kind, given in sections.items() for error in check_states(f"uncertainty.{kind}", given, machine)),
     ])  # fmt: skip
-    noise, initial = (
-        {m: _by_state(given, machine, k) for k, m in enumerate(machine.members)} for given in sections.values()
-    )
-    refuse([*check_shared(machine, noise, "noise"), *check_shared(machine, initial, "initial")])
+    found = {
+        kind: {m: by_state(given, machine, k) for k, m in enumerate(machine.members)}
+        for kind, given in sections.items()
+    }
+    refuse([error for kind, values in found.items() for error in check_shared(machine, values, kind)])
+    noise, steps, initial = found.values()
     laws = {m: law_for(study.controller.law, p, study.controller.modelling)
             for m, p in zip(machine.members, machine.plants, strict=True)}  # fmt: skip
     given = {m: _gains_of(study, m) for m in machine.members}
@@ -58,6 +69,7 @@ def assemble(study: Study, references: tuple[Reference, ...] | None = None) -> P
         m: gain_ranges(laws[m].schema, *given[m], laws[m].derived(study.controller.rate_of(m), initial[m]))
         for m in machine.members
     }
+    check_observer(study, machine, ranges)
     references = made_references(study, machine) if references is None else references
     slices = sliced(references)
     spans = {name: Interval(*d.range) for name, d in study.uncertainty.disturbances.items()}
@@ -66,12 +78,12 @@ def assemble(study: Study, references: tuple[Reference, ...] | None = None) -> P
     loads = machine.loads(spans)
     foreseen = loads.feedforward(slices) if loads is not None else None
     check_motion(machine, references)
-    observers = _observers(study, machine)
     members = []
     for k, (name, plant) in enumerate(zip(machine.members, machine.plants, strict=True)):
         law = law_for(study.controller.law, plant, study.controller.modelling)
         bounds = _bounds(
-            study, plant, references[k], 1 / study.controller.rate_of(name), spans, noise[name], initial[name],
+            study, plant, references[k], 1 / study.controller.rate_of(name), spans,
+            tuple(own + step / 2 for own, step in zip(noise[name], steps[name], strict=True)), initial[name],
             None if foreseen is None else foreseen[k],
         )  # fmt: skip
         named, loop = given[name][0], law.loop_model()
@@ -79,14 +91,12 @@ def assemble(study: Study, references: tuple[Reference, ...] | None = None) -> P
         accuracy = study.requirements.member_error.get(name, study.requirements.tracking_error_m)
         members.append(Member(
             name=name, plant=plant, law=law, model=loop, reference=references[k], bounds=bounds,
-            box=operating_box(plant), ranges=chosen, accuracy=accuracy,
+            box=operating_box(plant), ranges=chosen, accuracy=accuracy, resolution=steps[name],
         ))  # fmt: skip
-    return Problem(
-        study=study, machine=machine, members=tuple(members), slices=slices, loads=loads, observers=observers
-    )
+    return Problem(study=study, machine=machine, members=tuple(members), slices=slices, loads=loads)
 
 
-def _by_state(given: Mapping[str, float], machine: Machine, k: int) -> tuple[float, ...]:
+def by_state(given: Mapping[str, float], machine: Machine, k: int) -> tuple[float, ...]:
     """Values of a member's states."""
     plant = machine.plants[k]
     return tuple(given.get(state_key(plant, s), given.get(s, 0.0)) for s in plant.states)
@@ -156,22 +166,14 @@ def _bounds(
         feedforward=feedforward,
         delay=study.controller.delay_s,
         rest=(float(reference(np.zeros(1))[0, 0]), study.reference.dwell_s),
+        observer=observer_at(study, period),
     )
 
 
-def _observers(study: Study, machine: Machine) -> dict[str, SampledObserver]:
-    section, found = study.controller.observer, {}
-    for name in machine.members if section is not None else ():
-        assert section is not None
-        rate = study.controller.rate_of(name)
-        observer = SampledObserver.of_bandwidth(section.bandwidth_rad_s, section.largest, 1 / rate)
-        if sampled_bounds(observer, noise=0.0, acceleration=1.0, initial=0.0) is None:
-            raise InvalidInputError(
-                f"controller.observer must contract for every adaptive scalar: got {section.bandwidth_rad_s:g} "
-                f"rad/s with largest = {section.largest:g} at {rate:g} Hz; lower one of them"
-            )
-        found[name] = observer
-    return found
+def observer_at(study: Study, period: float) -> Observer | None:
+    """The observer that a study asks for at a control period."""
+    section = study.controller.observer
+    return None if section is None else Observer.of_bandwidth(section.bandwidth_rad_s, period)
 
 
 def _carried(machine: Machine, slices: Slices, disturbances: list[float]) -> tuple[float, ...]:

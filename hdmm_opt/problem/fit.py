@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from stability.loops.stack import MAX_DELAY
 from trajectories import Reference
@@ -12,6 +12,7 @@ from ..machines.machine import Machine
 from ..names import nearest
 from ..plants import Plant
 from ..study import Study
+from .member import GainRange
 
 _SUFFIX = {"m": "m", "m/s": "m_s", "N m": "nm", "A": "a", "rad": "rad", "rad/s": "rad_s", "N": "n", "Pa": "pa"}
 
@@ -85,6 +86,31 @@ def check_rates(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
             yield InvalidInputError(
                 f"controller.rates_hz.{name} must divide the fastest rate, {fastest:g} Hz: got {rate:g}; "
                 f"{fastest / round(fastest / rate):g} would do"
+            )
+
+
+def check_observer(study: Study, machine: Machine, ranges: Mapping[str, Sequence[GainRange]]) -> None:
+    """An observer makes position and speed of a position; it is around the reference, where no network acts.
+
+    Raises:
+        InvalidInputError: they do not fit.
+    """
+    if study.controller.observer is None:
+        return
+    for name, plant in zip(machine.members, machine.plants, strict=True):
+        if plant.first != "position" or len(plant.states) < 2 or plant.targets[1] != 0:
+            raise InvalidInputError(
+                f"controller.observer makes a speed of a position: {name} has {', '.join(plant.states)}; remove it"
+            )
+        speed = plant.states[1]
+        noisy = next((key for key in (state_key(plant, speed), speed) if study.uncertainty.noise.get(key, 0.0) > 0), "")
+        if noisy:
+            raise InvalidInputError(
+                f"uncertainty.noise.{noisy} has no meaning with controller.observer, which estimates it; remove it"
+            )
+        if any(item.name == "gamma_1" and item.high > 0 for item in ranges[name]):
+            raise InvalidInputError(
+                "gamma_1, a load network of the first row, has no place beside controller.observer; remove one"
             )
 
 

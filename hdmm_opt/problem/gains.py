@@ -93,7 +93,7 @@ def preloaded(
     if not found:
         return tuple(ranges)
     try:
-        start = first_box(model, bounds, gains, 1e-9 * box)
+        start, _ = first_box(model, bounds, gains, 1e-9 * box)
     except UnboundedError:  # nothing can be proved then, and the search says why
         return tuple(ranges)
     for k, low, high in zip(found, start.low, start.high, strict=True):

@@ -60,6 +60,7 @@ class Member:
         box: Largest set of errors that the proof may use. Shape (n,).
         ranges: The gains, in the order of the law's schema.
         accuracy: Required bound on the error after the transient, in the unit of the first state.
+        resolution: Steps in which the sensors count, 0 where they do not. Length n.
     """
 
     name: str
@@ -71,6 +72,7 @@ class Member:
     box: Array
     ranges: tuple[GainRange, ...]
     accuracy: float
+    resolution: tuple[float, ...]
 
     @property
     def control_units(self) -> list[str]:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from stability import Bounds, Interval
 from stability.networks.contracts import Contract, Subsystem
 from stability.networks.coupling import Loads, Slices, Tube
-from stability.networks.observer import SampledObserver, sampled_bounds
 
 from ..machines.machine import Machine
 from ..study import Study
@@ -37,7 +36,6 @@ class Problem:
         members: Its members; their `bounds` are those of members that keep to their references.
         slices: Ranges of all references over slices of time.
         loads: What the members do to each other; None without a coupling.
-        observers: The observer of each member by name; empty where speeds are measured.
     """
 
     study: Study
@@ -45,12 +43,11 @@ class Problem:
     members: tuple[Member, ...]
     slices: Slices
     loads: Loads | None
-    observers: Mapping[str, SampledObserver]
 
     @property
     def linked(self) -> bool:
         """Whether the proof of a member rests on what members guarantee."""
-        return self.loads is not None or bool(self.observers)
+        return self.loads is not None
 
     @property
     def foreseeing(self) -> bool:
@@ -114,29 +111,8 @@ class Problem:
                 (load,) = member.plant.disturbances
                 spread = {load: Interval.symmetric(SPARE * size)}
                 found[member.name] = replace(member.bounds, disturbances=spread)
-        for member in self.members:
-            if member.name in self.observers:
-                noise = self._estimated(member, guarantees[member.name])
-                found[member.name] = replace(found[member.name], noise=(*noise, *member.bounds.noise[2:]))
         return found
-
-    def _estimated(self, member: Member, tube: Tube) -> tuple[float, float]:
-        """Bounds on the errors of a member's observer."""
-        bounds = member.bounds
-        # |v(0) - r'(0)|, from the bounds on |Q_1(0)| and |Q_2(0)|
-        start = bounds.initial[1] + member.ranges[0].high / 2 * bounds.initial[0]
-        proof = sampled_bounds(
-            self.observers[member.name], noise=bounds.noise[0], initial=start,
-            acceleration=held_acceleration(tube, bounds.reference[3].magnitude, bounds.period),
-        )  # fmt: skip
-        assert proof is not None  # it was there for a tube of nothing, and its contraction does not depend on the tube
-        return proof.position, proof.speed
 
     def still(self) -> dict[str, Tube]:
         """Guarantees of members that keep to their references."""
         return dict.fromkeys(self.machine.members, Tube(position=0.0, speed=0.0, acceleration=0.0))
-
-
-def held_acceleration(tube: Tube, jerk: float, period: float) -> float:
-    """Bound on |x'' - r''(t_k)| within a period: the observer is given the reference's acceleration as it is held."""
-    return (tube.acceleration + period * jerk) * (1 + 1e-9)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..machines.model import STROKE
 from ..plants import EFFECTIVENESS, Plant
+from .build import by_state
 from .problem import Problem
 
 
@@ -31,12 +32,16 @@ def resolved(problem: Problem) -> dict[str, Any]:
         for name, member in several.items()
     }
     uncertainty = data["uncertainty"]
-    for kind in ("noise", "initial"):
+    for kind in ("noise", "resolution", "initial"):
         uncertainty[kind] = {
             state: value
-            for member in problem.members
-            for state, value in zip(member.plant.states, getattr(member.bounds, kind), strict=True)
+            for k, member in enumerate(problem.members)
+            for state, value in zip(
+                member.plant.states, by_state(getattr(problem.study.uncertainty, kind), problem.machine, k), strict=True
+            )
         }
+    if not any(uncertainty["resolution"].values()):
+        del uncertainty["resolution"]
     for disturbance in problem.machine.disturbances:
         uncertainty["disturbances"][disturbance.name] |= {"course": disturbance.course, "unit": disturbance.unit}
     return data

@@ -94,13 +94,15 @@ class Batches:
         s, columns = run.scenario, []
         random = s.noise * (1 - abs(s.bias)) * (1 - s.quantisation)
         for part in self.parts:
-            plant, bounds = part.law.plant, np.array([part.noise[i] for i in part.noisy])
+            plant, steps = part.law.plant, np.array(part.resolution)
+            bounds = (np.array(part.noise) - steps / 2)[part.noisy]
             fault = s.faults.get(part.name, SOUND)
             columns += [
                 np.asarray(run.gains[part.name]),
                 [s.parameter(part.name, name, p) for name, p in plant.parameters.items()],
                 bounds * random, bounds * s.bias * (1 - s.quantisation),
-                2 * s.quantisation * np.array(part.noise), fault.column(len(plant.inputs)),
+                np.where(steps > 0, steps, 2 * s.quantisation * np.array(part.noise)),
+                fault.column(len(plant.inputs)),
             ]  # fmt: skip
         return np.concatenate([np.asarray(column, dtype=float) for column in columns])
 
@@ -132,12 +134,12 @@ class Batches:
                 np.array([part.law.start(x0.tolist(), g.tolist()) for x0, g in zip(own.T, gains.T, strict=True)]).T,
                 (part.law.states, lanes),
             )
+            seen = own.copy()
+            if part.observer is not None:  # it starts from the first measurement and the reference's speed
+                discrete["observer"][0], seen[1] = own[0] - r[0], r[1]
             if part.waiting:
-                commands = self._first_commands(k, own, reference, discrete["law"], gains, load)
+                commands = self._first_commands(k, seen, reference, discrete["law"], gains, load)
                 discrete["pending"][:] = np.tile(commands, (part.waiting, 1))
-            if part.observed:
-                # an observer starts from its first measurement and the reference's speed
-                discrete["observer"][0], discrete["observer"][1] = own[0], r[1]
         return x, z
 
     def _first_commands(self, k: int, x: Array, r: Array, z: Array, gains: Array, load: Sequence[float]) -> Array:

@@ -126,7 +126,9 @@ def _tasks(
                 continue
             channel = draws[part.draws]
             measured = _measured(part, states[i], channel, constants[i], extras)
-            after.append(_controlled(problem, part, measured, r[i], foreseen[i], discrete[i], constants[i], t, extras))
+            after.append(_controlled(
+                problem, part, states[i], measured, r[i], foreseen[i], discrete[i], constants[i], t, extras
+            ))  # fmt: skip
         found.append(Task(every=every, after=ca.vertcat(*after)))
     if any(part.waiting for part in parts):
         passed = [_passed(part, discrete[i], constants[i], t, extras) for i, part in enumerate(parts)]
@@ -175,21 +177,17 @@ def _measured(part: Part, x: Any, draws: Any, constants: dict[str, Any], extras:
 
 
 def _controlled(
-    problem: Problem, part: Part, measured: Any, r: Any, foreseen: Any, discrete: dict[str, Any],
+    problem: Problem, part: Part, x: Any, measured: Any, r: Any, foreseen: Any, discrete: dict[str, Any],
     constants: dict[str, Any], t: Any, extras: frozenset[str],
 ) -> Any:  # fmt: skip
     """One period of a member's observer, law and actuator, in the order of its discrete states."""
     import casadi as ca
 
-    plant, watched = part.law.plant, discrete["observer"]
-    seen, following = measured, watched
-    if part.observed:
-        section = problem.study.controller.observer
-        assert section is not None
-        seen = ca.vertcat(watched[:2], measured[2:])
-        following = observed(
-            problem.observers[part.name], (section.epsilon, section.sigma), part.noise[0], watched, measured[0], r[2]
-        )
+    plant, seen, following = part.law.plant, measured, discrete["observer"]
+    if part.observer is not None:
+        estimate, after = observed(part.observer, part.period, following[:2], measured[0] - r[0])
+        seen = ca.vertcat(r[:2] + estimate, measured[2:])
+        following = ca.vertcat(after, seen[:2] - x[:2])
     nominal = ca.DM(list(plant.values().values()))
     bounds = problem.members[part.index].bounds
     load = foreseen if foreseen is not None else ca.DM([bounds.nominal[name] for name in plant.disturbances])

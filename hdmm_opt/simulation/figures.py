@@ -120,7 +120,7 @@ def figures(
 
 def _member(part: Part, found: Mapping[str, float], gone: bool, ticks: int, late: int, period: float) -> MemberFigures:
     name, outputs = part.name, [key for key in part.law.plant.outputs if key != "power"]
-    watched = [found[f"estimated {what} {name}"] for what in ("position", "speed")] if part.observed else []
+    watched = [found[f"estimated {what} {name}"] for what in ("position", "speed")] if part.observer else []
     return MemberFigures(
         largest_error=math.inf if gone else found[f"error {name}"],
         maximum_error=math.inf if gone else found[f"late {name}"],

@@ -12,9 +12,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from stability import Observer
+
 from ..control import Law
-from ..control.observer import STATES
+from ..control.observer import SIZE
 from ..problem import Problem
+from ..problem.build import observer_at
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +31,8 @@ class Part:
         every: It runs at each tick whose number is a multiple of this.
         period: Its control period, s.
         noise: Bounds on its measurement errors. Shape (n,).
-        observed: Whether an observer estimates its position and speed.
+        resolution: Steps in which its sensors count. Shape (n,).
+        observer: What estimates its position and speed; None where they are measured.
         errors: Number of errors that its law shows.
         waiting: Ticks until a commanded input acts.
         x, z, draws, fixed: Slices of its states, discrete states, random draws and constants.
@@ -40,7 +44,8 @@ class Part:
     every: int
     period: float
     noise: tuple[float, ...]
-    observed: bool
+    resolution: tuple[float, ...]
+    observer: Observer | None
     errors: int
     waiting: int
     x: slice
@@ -74,7 +79,7 @@ class Part:
         """Sizes of its discrete states."""
         inputs = len(self.law.plant.inputs)
         return {"law": self.law.states, "commanded": inputs, "applied": inputs, "errors": self.errors,
-                "observer": STATES if self.observed else 0, "pending": inputs * self.waiting}  # fmt: skip
+                "observer": 0 if self.observer is None else SIZE, "pending": inputs * self.waiting}  # fmt: skip
 
     @property
     def constant_sizes(self) -> dict[str, int]:
@@ -99,13 +104,12 @@ def parts_of(problem: Problem, laws: Sequence[Law], period: float) -> list[Part]
     for k, (member, law) in enumerate(zip(problem.members, laws, strict=True)):
         own = max(member.bounds.period, period)
         every = round(own / period)
-        observed = member.name in problem.observers
-        noise = member.bounds.noise if not observed else (member.bounds.noise[0], 0.0, *member.bounds.noise[2:])
         nothing = slice(0, 0)
         part = Part(
-            index=k, name=member.name, law=law, every=every, period=every * period, noise=noise, observed=observed,
-            errors=errors_of(law), waiting=round(member.bounds.delay / period), x=nothing, z=nothing, draws=nothing,
-            fixed=nothing,
+            index=k, name=member.name, law=law, every=every, period=every * period, noise=member.bounds.noise,
+            resolution=member.resolution,
+            observer=observer_at(problem.study, every * period), errors=errors_of(law),
+            waiting=round(member.bounds.delay / period), x=nothing, z=nothing, draws=nothing, fixed=nothing,
         )  # fmt: skip
         sizes = {"x": len(law.plant.states), "z": sum(part.discrete_sizes.values()), "draws": len(part.noisy),
                  "fixed": sum(part.constant_sizes.values())}  # fmt: skip

@@ -91,8 +91,8 @@ class Loop:
             The figures in the order of the runs.
         """
         found: dict[int, Figures] = {}
-        for extras in dict.fromkeys(_extras(run.scenario) for run in runs):
-            chosen = [k for k, run in enumerate(runs) if _extras(run.scenario) == extras]
+        for extras in dict.fromkeys(self._extras(run.scenario) for run in runs):
+            chosen = [k for k, run in enumerate(runs) if self._extras(run.scenario) == extras]
             engine, batch = self.engine(extras), self.batches.batch([runs[k] for k in chosen], duration)
             outcome = engine.run(batch, jobs=jobs)
             found |= zip(chosen, self._figures(engine, outcome.figures, outcome.lost, batch), strict=True)
@@ -113,7 +113,7 @@ class Loop:
             scenario: What the run meets.
             duration: Length of the run, s; that of the reference by default.
         """
-        engine = self.engine(_extras(scenario))
+        engine = self.engine(self._extras(scenario))
         batch = self.batches.batch([Run(gains=gains, scenario=scenario)], duration)
         found = engine.run(batch, trace=True)
         rows, lost = engine.system.signal_rows(), float(found.lost[0])
@@ -157,7 +157,7 @@ class Loop:
         Raises:
             ValueError: a scenario with a fault or with quantisation, which has no useful derivative.
         """
-        if any(_extras(run.scenario) for run in runs):
+        if any(run.scenario.quantisation or run.scenario.faults for run in runs):
             raise ValueError(
                 "a loop is differentiated without faults and without quantisation: got a scenario with them"
             )
@@ -215,8 +215,8 @@ class Loop:
             found[member.name] = float(np.linalg.norm(asked, axis=0).max())
         return found
 
-
-def _extras(scenario: Scenario) -> frozenset[str]:
-    """What a run needs of the loop besides."""
-    wanted = {"quantisation": scenario.quantisation > 0, "fault": bool(scenario.faults)}
-    return frozenset(name for name, needed in wanted.items() if needed)
+    def _extras(self, scenario: Scenario) -> frozenset[str]:
+        """What a run needs of the loop besides."""
+        counted = any(step > 0 for part in self.parts for step in part.resolution)
+        wanted = {"quantisation": counted or scenario.quantisation > 0, "fault": bool(scenario.faults)}
+        return frozenset(name for name, needed in wanted.items() if needed)

@@ -59,8 +59,11 @@ def records(problem: Problem, parts: Sequence[Part], settings: Settings, signals
     ]
     for i, part in enumerate(parts):
         found += _of_member(part, signals, i, late)
-        if part.observed:
-            found += _estimates(part, signals, i)
+        if part.observer is not None:
+            found += [
+                Record(name=f"estimated {what} {part.name}", kind="max", value=ca.fabs(signals.estimates[i][2 + k]))
+                for k, what in enumerate(("position", "speed"))
+            ]
     return tuple(found)
 
 
@@ -88,24 +91,6 @@ def _of_member(part: Part, signals: Signals, i: int, late: Any) -> list[Record]:
         found.append(Record(name=f"peak {output} {name}", kind="max", value=ca.fabs(value)))
         found.append(Record(name=f"squares {output} {name}", kind="sum", value=value**2))
     return found
-
-
-def _estimates(part: Part, signals: Signals, i: int) -> list[Record]:
-    """The errors of an observer, where what it foresaw for the end of a period has come."""
-    import casadi as ca
-
-    tick = part.period / part.every
-    ended = signals.tau > (1 - 1e-6) * tick
-    if part.every > 1:
-        cycles = (signals.t + signals.tau) / part.period
-        ended = ca.logic_and(ended, ca.fabs(cycles - ca.floor(cycles + 0.5)) < 1e-6)
-    return [
-        Record(
-            name=f"estimated {what} {part.name}", kind="max", between=True,
-            value=ca.if_else(ended, ca.fabs(signals.states[i][k] - signals.estimates[i][k]), 0),
-        )
-        for k, what in enumerate(("position", "speed"))
-    ]  # fmt: skip
 
 
 def _norm(parts: list[Any]) -> Any:

@@ -13,12 +13,12 @@ Rate = Annotated[float, Field(gt=0, le=1e5)]
 
 
 class ObserverSection(Section):
-    """A motion-state observer for every member: position is measured, speed is not (P-4)."""
+    """A motion-state observer for every member: position is measured, speed is not (P-4).
 
-    bandwidth_rad_s: Positive
-    largest: NonNegative = 0.1
-    epsilon: NonNegative = 0.0
-    sigma: Positive = 10.0
+    Without a bandwidth the speed is the difference of two measurements.
+    """
+
+    bandwidth_rad_s: Positive | None = None
 
 
 class ControllerSection(Section):

@@ -73,8 +73,12 @@ class DisturbanceSection(Section):
 
 
 class UncertaintySection(Section):
-    """What the proof covers besides parameter tolerances: disturbances, measurement errors, initial errors."""
+    """What the proof covers besides parameter tolerances: disturbances, measurement errors, initial errors.
+
+    A measurement may be wrong by its noise and by half of the step in which the sensor counts.
+    """
 
     disturbances: dict[Name, DisturbanceSection] = Field(default_factory=dict)
     noise: dict[str, NonNegative] = Field(default_factory=dict)
+    resolution: dict[str, NonNegative] = Field(default_factory=dict)
     initial: dict[str, NonNegative] = Field(default_factory=dict)

@@ -68,12 +68,13 @@ def budget_of(search: Search, bounds: Bounds, found: Impulse) -> Budget:
 
 
 def _names(search: Search) -> list[str]:
-    model = search.model
+    model, observed = search.model, search.bounds.observer is not None
     states = [row.state for row in model.rows]
     return [
         *(f"what acts on {state}" for state in states),
         *(f"rate of what the network of {states[i]} meets" for i in search.own),
         *(f"change of {name} until it acts" for name in model.inputs),
         *(f"rounding of the network of {states[i]}" for i in search.own),
+        *(f"rounding of the observed {state}" for state in states[: 2 if observed else 0]),
         *(f"measurement of {state}" for state in states),
     ]

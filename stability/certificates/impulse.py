@@ -108,13 +108,18 @@ def begun(
 
 @dataclass(frozen=True)
 class _Bound:
-    """What one cell reaches: forced part, all of it, and the transient's amplitude; over (z, s, v, c)."""
+    """What one cell reaches over (z, s, v, c), from S and from what Z(0) is made of.
+
+    The forced part and all of it; |z'|; and the amplitude of what starts at Z(0), with the growth of which it shrinks.
+    """
 
     forced: Array
     whole: Array
-    amplitude: Array
-    growth: float
     rates: Array
+    reads: Array
+    first: Array
+    amplitude: Array
+    growth: float = 1.0
 
 
 class Search:
@@ -132,8 +137,8 @@ class Search:
         self.model, self.gains, self.limit = model, gains, limit
         self.own = networks(model, gains)
         self.steering, self.direct = wiring(model, self.own)
-        self.box = first_box(model, bounds, gains, np.maximum(np.array(bounds.initial), NOTHING * limit))
-        self.rows = deviation_rows(model, bounds, gains, self.box)
+        start = rounded(np.maximum(np.array(bounds.initial), NOTHING * limit))
+        self.bounds, (self.box, self.rows) = bounds, first_box(model, bounds, gains, start)
         self.split = cut.of(self.rows)
         self.force = np.array([rounded(row) for row in (self.rows.low + self.rows.high) / 2])
         self.drive = np.array([rounded(row) for row in (self.rows.input_low + self.rows.input_high) / 2])
@@ -148,7 +153,7 @@ class Search:
         return Stack(
             a=self.force / mass[:, None], b=self.drive / mass[:, None], steering=self.steering, direct=self.direct,
             control=controller(self.model, self.gains, rows, bounds.period), period=bounds.period, whole=whole,
-            share=share,
+            share=share, observer=bounds.observer,
         )  # fmt: skip
 
     def run(self, bounds: Bounds) -> Impulse | Failure:
@@ -164,14 +169,15 @@ class Search:
             known = [r for r in summed if r is not None]
             if len(known) < len(summed):
                 return self._unstable(cells_of(taken, self.split)[summed.index(None)], bounds)
-            rows = deviation_rows(self.model, bounds, self.gains, box)
+            known_rows = box is self.box and bounds is self.bounds
+            rows = self.rows if known_rows else deviation_rows(self.model, bounds, self.gains, box)
             parts, control = cells_of(rows, self.split), controller(self.model, self.gains, rows, bounds.period)
             found = [self._cell(part, r, control, bounds, box) for part, r in zip(parts, known, strict=True)]
             solved = [entry for entry in found if isinstance(entry, _Bound)]
             if len(solved) < len(found):
                 return next(entry for entry in found if isinstance(entry, Failure))
             needed = self._needed(rows, solved, bounds)
-            have = [box.half_widths, box.input_bound, box.network_bound]
+            have = [box.half_widths, box.input_bound, box.network_bound, box.shown]
             if all((want * ROOM <= own).all() for want, own in zip(needed, have, strict=True)):
                 if _moved(taken, rows) <= MOVED:
                     return self._certificate(rows, known, solved, bounds, box)
@@ -181,14 +187,16 @@ class Search:
             if (needed[0] > self.limit).any():
                 worst = int(np.argmax(needed[0] / self.limit))
                 return Failure(reason="the certified set outgrows the operating box", row=worst)
-            grown = [np.where(w * ROOM <= o, o, w * WIDENING) for w, o in zip(needed, have, strict=True)]
-            box = replace(box, half_widths=grown[0], input_bound=grown[1], network_bound=grown[2])
+            # coordinates are in units of the box, as a file carries it
+            grown = [np.where(w * ROOM <= o, o, rounded(w * WIDENING)) for w, o in zip(needed, have, strict=True)]
+            box = replace(box, half_widths=grown[0], input_bound=grown[1], network_bound=grown[2], shown=grown[3])
         return Failure(reason=f"the box did not settle in {STEPS} iterations", row=len(self.limit) - 1)
 
     def _needed(self, rows: DeviationRows, solved: list[_Bound], bounds: Bounds) -> list[Array]:
-        n, m = len(self.limit), len(self.model.inputs)
+        n, m, q = len(self.limit), len(self.model.inputs), len(self.own)
         whole = np.max([entry.whole for entry in solved], axis=0)
-        return [whole[:n], whole[2 * n : 2 * n + m] + late_of(rows, bounds), whole[2 * n + m :]]
+        _, _, inputs, missed, shown = np.split(whole, np.cumsum((n, n, m, q)))
+        return [whole[:n], inputs + late_of(rows, bounds), missed, shown]
 
     def _cell(
         self, rows: DeviationRows, known: Responses, control: Controller, bounds: Bounds, box: Box
@@ -205,14 +213,19 @@ class Search:
         found = closed(plain, reads, np.column_stack([forced, forced + begun]))
         if isinstance(found, Failure):
             return replace(found, row=n - 1)
-        late, best = periods_in(bounds.transient, bounds.period), (math.inf, 1.0, found[:, 1])
-        for growth, sums in known.weighted.items():
-            shrinking = closed(sums, reads, (sums.begin @ first)[:, None])
-            if not isinstance(shrinking, Failure):
-                best = min(best, (shrinking[0, 0] * growth**-late, growth, shrinking[:, 0]), key=lambda way: way[0])
         moved = stack.sources()[:n, n:] @ rows.demand_rate
         rates = found[n : 2 * n, 1] + reads[:n] @ found[:, 1] + push[:n] + moved
-        return _Bound(found[:, 0], found[:, 1], best[2], best[1], rates)
+        return _Bound(found[:, 0], found[:, 1], rates, reads, first, found[:, 1])
+
+    def _shrinking(self, known: Responses, bound: _Bound, bounds: Bounds) -> _Bound:
+        """The bound with the transient that is smallest when the bound on the error must hold."""
+        late, best = periods_in(bounds.transient, bounds.period), math.inf
+        for growth, sums in known.weighted.items():
+            found = closed(sums, bound.reads, (sums.begin @ bound.first)[:, None])
+            if not isinstance(found, Failure) and found[0, 0] * growth**-late < best:
+                best = found[0, 0] * growth**-late
+                bound = replace(bound, amplitude=found[:, 0], growth=growth)
+        return bound
 
     def _start(self, rows: DeviationRows, bounds: Bounds, box: Box) -> Array:
         """What Z(0) is made of, see `Stack.begin`.
@@ -230,6 +243,7 @@ class Search:
         self, rows: DeviationRows, known: list[Responses], solved: list[_Bound], bounds: Bounds, box: Box
     ) -> Impulse:
         n, m = len(self.limit), len(self.model.inputs)
+        solved = [self._shrinking(r, s, bounds) for r, s in zip(known, solved, strict=True)]
         settled = _after(solved, periods_in(bounds.transient, bounds.period))
         whole = np.concatenate([box.half_widths, box.input_bound])
         sizes = rows.sizes(whole, resting=False)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..loops.box import Box, DeviationRows
+from ..loops.deviation import ROUNDED
 from ..loops.model import Bounds
 from ..loops.responses import Responses, Sums
 from ..loops.stack import Controller, Stack
@@ -83,22 +84,27 @@ def late_of(rows: DeviationRows, bounds: Bounds) -> Array:
 
 
 def small_gain(rows: DeviationRows, stack: Stack, ctl: Controller, bounds: Bounds) -> tuple[Array, Array]:
-    """S over y = (z, s, v, c), and the known part of what acts: ρ, then pulses; `ctl` is the controller in the box."""
+    """S over y = (z, s, v, c, and what is bounded of an observer), and the known part of what acts: ρ, then pulses.
+
+    `ctl` is the controller in the box.
+    """
     n, m, q = stack.sizes
     mass = middle_of(rows)
     change = np.maximum(mass / rows.mass_low - 1, 1 - mass / rows.mass_high)
     per, more = 1 / mass[:, None], (1 + change)[:, None]
     spread = np.maximum(np.abs(rows.low * per - stack.a), np.abs(rows.high * per - stack.a))
     loose = np.maximum(np.abs(rows.input_low * per - stack.b), np.abs(rows.input_high * per - stack.b))
-    noise = np.array(bounds.noise)
-    reads = np.zeros((n + m + q, 2 * n + m + q))
-    reads[:n, :n], reads[:n, n : 2 * n], reads[:n, 2 * n : 2 * n + m] = more * spread, np.diag(change), more * loose
-    reads[n : n + m, :n], reads[n : n + m, 2 * n + m :] = ctl.feedback_spread, ctl.network_spread
-    reads[n + m :, :n], reads[n + m :, 2 * n + m :] = ctl.entry_spread, ctl.keep_spread
+    first = 2 * n + m
+    reads = np.zeros((n + m + q + stack.watched, first + q + stack.shown))
+    reads[:n, :n], reads[:n, n : 2 * n], reads[:n, 2 * n : first] = more * spread, np.diag(change), more * loose
+    reads[n : n + m, :n], reads[n : n + m, first : first + q] = ctl.feedback_spread, ctl.network_spread
+    reads[n + m : n + m + q, :n], reads[n + m : n + m + q, first : first + q] = ctl.entry_spread, ctl.keep_spread
+    if stack.observer is not None:
+        reads[n + m + q :, -1] = (ROUNDED.high - 1) * np.array([stack.observer.first, stack.observer.second])
     drift = (np.abs(stack.b) + loose) @ late_of(rows, bounds)
     push = np.concatenate([
-        (1 + change) * (rows.disturbance / mass + drift), rows.noise + ctl.feedback_spread @ noise,
-        ctl.entry_spread @ noise,
+        (1 + change) * (rows.disturbance / mass + drift), rows.noise + ctl.feedback_spread @ rows.measured,
+        ctl.entry_spread @ rows.measured, np.zeros(stack.watched),
     ])  # fmt: skip
     return reads, push
 
@@ -116,16 +122,19 @@ def cells_of(rows: DeviationRows, split: tuple[int, ...]) -> list[DeviationRows]
 def closed(sums: Sums, reads: Array, known: Array) -> Array | Failure:
     """(I - Λ S)^-1 known, where Λ S contracts. Shape of known."""
     gain = np.hstack([sums.rest[:, : reads.shape[0] - sums.pulses.shape[1]], sums.pulses]) @ reads
-    radius = float(np.max(np.abs(np.linalg.eigvals(gain)), initial=0.0))
-    if radius < LARGEST:
-        return np.asarray(np.linalg.solve(np.eye(len(gain)) - gain, known), dtype=np.float64)
+    one = np.eye(len(gain))
+    # a non-negative matrix is below LARGEST where some s > 0 has gain s < LARGEST s (Berman and Plemmons 1994, ch. 6)
+    if (np.linalg.solve(LARGEST * one - gain, np.ones(len(gain))) > 0).all():
+        return np.asarray(np.linalg.solve(one - gain, known), dtype=np.float64)
+    radius = float(np.max(np.abs(np.linalg.eigvals(gain))))
     return Failure(reason=f"the uncertainty is too large for this loop: its small gain is {radius:.3g}, 1 is the limit")
 
 
 def cell_of(found: Responses, growth: float, box: Box) -> Cell:
     """What the checker needs to know of some responses, in units of the box."""
     stack = found.stack
-    unit = np.concatenate([box.half_widths, box.network_bound, np.tile(box.input_bound, stack.pending)])
+    own = box.half_widths[: stack.watched]
+    unit = np.concatenate([box.half_widths, box.network_bound, own, np.tile(box.input_bound, stack.pending)])
     columns = found.basis.columns / unit[:, None]
     columns = columns / np.repeat(_sizes(columns, found.basis.blocks), found.basis.blocks)
     return Cell(columns=columns, blocks=found.basis.blocks, groups=found.groups, growth=growth)
@@ -133,5 +142,5 @@ def cell_of(found: Responses, growth: float, box: Box) -> Cell:
 
 def _sizes(columns: Array, blocks: tuple[int, ...]) -> Array:
     """The largest entry of each block of columns."""
-    ends = np.cumsum((0, *blocks))
-    return np.array([np.abs(columns[:, c : c + size]).max() for c, size in zip(ends, blocks, strict=False)])
+    starts = np.cumsum((0, *blocks[:-1]))
+    return np.asarray(np.maximum.reduceat(np.abs(columns).max(axis=0), starts), dtype=np.float64)

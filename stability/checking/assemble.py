@@ -14,7 +14,7 @@ from pathlib import Path
 ORDER = (
     "limits", "arithmetic", "forms", "fixed", "parsing", "shape", "grammar", "claim", "reference", "statement",
     "structure", "course", "reading", "loop", "matrices", "turn", "sums", "responses", "obligation", "impulse",
-    "golden", "effects", "obligations", "member", "motion", "coupling", "observer", "requirements", "command",
+    "golden", "effects", "obligations", "member", "motion", "coupling", "requirements", "command",
 )  # fmt: skip
 TARGET = Path(__file__).parent.parent / "checker.py"
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from .arithmetic import Interval
-from .limits import MAX_GROUP, MAX_GROUPS, MAX_ORDER, need
+from .limits import MAX_BLOCK, MAX_GROUP, MAX_GROUPS, MAX_ORDER, need
 from .parsing import index, number, numbers
 
 
@@ -70,6 +70,13 @@ class Claim:
     feedforward: dict[str, tuple[Interval, Interval]] = field(default_factory=dict)
     first: str = "position"
     rest: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0))
+    observer: tuple[Fraction, ...] = ()
+    shown: list[Fraction] = field(default_factory=list)
+
+    @property
+    def measured(self) -> list[Fraction]:
+        """Bounds on the errors of what the controller knows of the states: measured, or by an observer."""
+        return [*self.shown[:2], *self.noise[2:]] if self.observer else self.noise
 
     @property
     def controlled(self) -> list[int]:
@@ -101,7 +108,7 @@ def cell_of(entry: dict[str, Any]) -> Cell:
     """One cell of a certificate; how large it must be is decided where the loop is built."""
     columns = entry["columns"]
     need(isinstance(columns, list) and 1 <= len(columns) <= MAX_ORDER, f"coordinates are of 1 to {MAX_ORDER} states")
-    blocks = [index(v, 3, "a block") for v in entry["blocks"]]
+    blocks = [index(v, MAX_BLOCK + 1, "a block") for v in entry["blocks"]]
     need(min(blocks) >= 1 and sum(blocks) == len(columns), "the blocks do not cover the coordinates")
     groups = [index(v, MAX_GROUP + 1, "a group of periods") for v in entry["groups"]]
     need(1 <= len(groups) <= MAX_GROUPS and min(groups) >= 1, f"1 to {MAX_GROUPS} groups of periods are summed")

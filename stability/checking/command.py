@@ -30,7 +30,6 @@ from .limits import (
 )
 from .member import Member, check_member
 from .obligation import Obligation, Report, above, downward, milli, percent, upward
-from .observer import observed
 from .parsing import check_digests, number, parse, wrong_schema
 from .requirements import beyond_error
 from .statement import met
@@ -91,6 +90,7 @@ def check_machine(data: dict[str, Any], file: str, recorded: bool = True) -> Rep
         ("controller.rates_hz", study["controller"].get("rates_hz", {}), set(names)),
         ("requirements.member_error", study["requirements"].get("member_error", {}), set(names)),
         ("uncertainty.noise", study["uncertainty"].get("noise", {}), states),
+        ("uncertainty.resolution", study["uncertainty"].get("resolution", {}), states),
         ("uncertainty.initial", study["uncertainty"].get("initial", {}), states),
     ):
         need(set(given) <= known, f"the study's {where} names something that the file does not have")
@@ -116,14 +116,12 @@ def check_machine(data: dict[str, Any], file: str, recorded: bool = True) -> Rep
 def check_together(
     data: dict[str, Any], members: list[Member], made: list[Obligation], file: str, recorded: bool
 ) -> Report:
-    """What joins the members: guarantees, coupling, observers; and the bound on the output."""
+    """What joins the members: guarantees and coupling; and the bound on the output."""
     WORK.begin(MAX_COUPLED)
-    observing = data["study"]["controller"].get("observer") is not None
-    if data["couplings"] or observing:
+    if data["couplings"]:
         made.append(guarantees_kept(data, members))
     coupling = Coupling(data, data["couplings"][0], members) if data["couplings"] else None
     made += coupling.obligations() if coupling is not None else []
-    made += [observed(data, members)] if observing else []
     wrong = [o for o in made if o.verdict != "proved"]
     if wrong:
         text = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"

@@ -21,7 +21,7 @@ NONE: Fixed = (0, 0)
 #: What a tanh costs, in products.
 TANH_COST = 300
 #: What a sine and a cosine of one number cost, in products.
-TURN_COST = 20
+TURN_COST = 27
 
 
 def to_fixed(a: Interval) -> Fixed:

@@ -75,7 +75,7 @@ STUDY = entry_of(
             "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit},
                                            {"rate": positive}), 8),
             "noise": named(plain_number), "initial": named(plain_number),
-        }),
+        }, {"resolution": named(plain_number)}),
         "reference": entry_of(
             {"kind": some("quintic", "bspline"), "coordinates": some("members"),
              "waypoints": listed(listed(plain_number, 1, MAX_MEMBERS), 2, 50),
@@ -87,7 +87,7 @@ STUDY = entry_of(
             {"law": text, "modelling": listed(some(*MODELLING), 0, 8), "rate_hz": plain_number,
              "rates_hz": named(plain_number), "delay_s": share,
              "gains": NOTHING, "members": named(named(RANGE))},
-            {"observer": entry_of(dict.fromkeys(("bandwidth_rad_s", "largest", "epsilon", "sigma"), plain_number))},
+            {"observer": entry_of({}, {"bandwidth_rad_s": plain_number})},
         ),
         "requirements": entry_of(
             {"tracking_error_m": plain_number, "member_error": named(plain_number)},
@@ -116,7 +116,7 @@ CERTIFICATE = entry_of(
                                "blocks": listed(whole, 1, MAX_ORDER), "groups": listed(whole, 1, MAX_GROUPS),
                                "growth": ratio}), 1, MAX_CELLS),
      "envelope": entry_of({"rate": ratio, "ultimate": EXACT})},
-    {"guarantee": listed(ratio, 3, 3)},
+    dict.fromkeys(("guarantee", "observed"), listed(ratio, 3, 3)),
 )  # fmt: skip
 MEMBER = entry_of(
     {
@@ -146,7 +146,7 @@ MEMBER = entry_of(
             dict.fromkeys(("x", "r", "theta", "phi", "u", "theta_next", "phi_next"), listed(plain_number, 1, MAX_ROWS)),
             {"load": listed(plain_number, 1, 1)}), 20, 100),
     },
-    {"observer": entry_of({"first": plain_number, "second": plain_number, "pole": plain_number})},
+    {"observer": entry_of({"first": plain_number, "second": plain_number})},
 )  # fmt: skip
 COUPLING = entry_of({"members": listed(name, 1, MAX_MEMBERS), "loads": PROGRAM, "place": PROGRAM, "halvings": whole,
                      "envelope": entry_of({"output": ratio})})  # fmt: skip

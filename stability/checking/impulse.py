@@ -23,7 +23,7 @@ ROOM = Fraction(1, 1 << 30)
 
 
 class Bounded:
-    """One cell: what y = (z, s, v, c) reaches, and how fast what a start makes of it shrinks."""
+    """One cell: what y = (z, s, v, c, an observer's) reaches, and how fast what a start makes of it shrinks."""
 
     def __init__(self, turn: Turn, cell: Cell) -> None:
         self.turn, self.cell = turn, cell
@@ -31,7 +31,7 @@ class Bounded:
         self.spare = found.spare
         plain, weighted = ([_fractions(part) for part in sums] for sums in found.sums)
         self.reads, pulses = self._reads()
-        n, q, m = turn.n, turn.q, turn.m
+        n, m = turn.n, turn.m
         self.gain = [self._gain(sums) for sums in (plain, weighted)]
         forced = [dot(row[:n], turn.push) + dot(row[n:], turn.moving) for row in plain[0]]
         forced = [v + dot(row, [*pulses, *turn.noise]) for v, row in zip(forced, plain[1], strict=True)]
@@ -45,30 +45,32 @@ class Bounded:
         self.rates = [up(s + r + p) for s, r, p in zip(self.whole[n : 2 * n], acted, moved, strict=True)]
         self.inputs = [v + late for v, late in zip(self.whole[2 * n : 2 * n + m], turn.late, strict=True)]
         self.missed = self.whole[2 * n + m :]
-        assert len(self.missed) == q
 
     def _reads(self) -> tuple[Matrix, list[Fraction]]:
-        """S: |ρ| and the pulses on inputs and networks over y; and what of the pulses is known."""
+        """S: |ρ| and the pulses on inputs, networks and an observer over y; and what of the pulses is known."""
         turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
-        nothing = [Fraction(0)] * q
+        nothing = [Fraction(0)] * (q + len(turn.shown))
         reads = []
         for i in range(n):
             more = 1 + turn.change[i]
             row = [more * v for v in turn.a_spread[i]]
             row += [turn.change[i] * int(i == j) for j in range(n)]
             reads.append([*row, *(more * v for v in turn.b_spread[i]), *nothing])
-        known = list(turn.blur) + nothing
+        known = list(turn.blur) + [Fraction(0)] * (q + turn.w)
+        errors = [size / r for size, r in zip(turn.claim.measured, turn.claim.half_widths, strict=True)]
         for k, row in enumerate([*turn.act_spread, *turn.learn_spread]):
-            reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:]])
-            known[k] += dot(row[:n], turn.noise)
+            reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:], *[Fraction(0)] * len(turn.shown)])
+            known[k] += dot(row[:n], errors)
+        for gain in turn.blind:
+            reads.append([*[Fraction(0)] * (len(reads[0]) - 1), gain])
         return [[up(v) for v in row] for row in reads], [up(v) for v in known]
 
     def _gain(self, sums: list[Matrix]) -> Matrix:
         """Λ S."""
-        n, m, q = self.turn.n, self.turn.m, self.turn.q
+        n, count = self.turn.n, self.turn.width - self.turn.n
         columns = list(zip(*self.reads, strict=True))
         return [
-            [up(dot([*rest[:n], *pulses[: m + q]], column)) for column in columns]
+            [up(dot([*rest[:n], *pulses[:count]], column)) for column in columns]
             for rest, pulses in zip(sums[0], sums[1], strict=True)
         ]
 

@@ -19,8 +19,8 @@ REQUIRED = {
     }
 }  # fmt: skip
 MAX_BYTES, MAX_DIGITS, MAX_EXPONENT, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS = 2_000_000, 60, 60, 12_000, 8, 1_000
-#: Cells of a certificate, states of a loop with all that it remembers, groups of periods that are summed.
-MAX_CELLS, MAX_ORDER, MAX_GROUPS = 64, 24, 400
+#: Cells of a certificate, states of a loop with all that it remembers and of a block, groups of periods summed.
+MAX_CELLS, MAX_ORDER, MAX_BLOCK, MAX_GROUPS = 64, 24, 4, 400
 #: Largest number of periods in a group, and of periods of delay.
 MAX_GROUP, MAX_DELAY = 2_000, 8
 #: A parameter that may change in a run: faults take effectiveness.

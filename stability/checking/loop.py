@@ -112,19 +112,19 @@ class Loop:
 
     def noise(self, i: int) -> Fraction:
         """Bound on the error of the Q_i that the controller computes."""
-        target, own = self.claim.rows[i]["target"], self.claim.noise[i]
+        target, own = self.claim.rows[i]["target"], self.claim.measured[i]
         if isinstance(target, str):
             return own
         return own + up(self.half[target][1] * self.noise(target) + self.term_noise(target))
 
     def term_noise(self, i: int) -> Fraction:
         """What measurement errors make of a modelling term."""
-        shaken = {r["state"]: {"": symmetric(n)} for r, n in zip(self.claim.rows, self.claim.noise, strict=True)}
+        shaken = {r["state"]: {"": symmetric(n)} for r, n in zip(self.claim.rows, self.claim.measured, strict=True)}
         return magnitude(derivative(self.term[i], self._ranges(), shaken).get("", ZERO))
 
     def _ranges(self) -> dict[str, Interval]:
         ranges = {name: node.range for name, node in self.nodes.items()}
-        for row, noise in zip(self.claim.rows, self.claim.noise, strict=True):
+        for row, noise in zip(self.claim.rows, self.claim.measured, strict=True):
             if row["state"] in ranges:
                 ranges[row["state"]] = add(ranges[row["state"]], symmetric(noise))
         return ranges

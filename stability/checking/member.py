@@ -41,8 +41,7 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     """Re-prove one member under its own assumptions."""
     entry = data["members"][which]
     claim = read(data, entry, coupled)
-    linked = coupled or data["study"]["controller"].get("observer") is not None
-    need(not (linked and 0 in claim.networks), "a first row with a load network is of a member that nothing links")
+    need(not (coupled and 0 in claim.networks), "a first row with a load network is of a member that nothing links")
     consistent(data, entry, claim)
     follows(data, entry, claim, which)
     well_formed(claim)

@@ -44,6 +44,7 @@ def vacuity(claim: Claim) -> Fraction:
     """1 where everything that must be positive is, and -1 elsewhere."""
     may_be_zero = [*claim.noise, *claim.initial, claim.delay]
     positive = [claim.period, claim.accuracy, *claim.half_widths, *claim.input_bound, *claim.network_bound]
+    positive += claim.shown
     positive += [limit["value"] for limit in claim.limits] + [claim.stroke[1] - claim.stroke[0]]
     return Fraction(-1 if min(positive) <= 0 or min(may_be_zero) < 0 else 1)
 

@@ -43,9 +43,8 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     nominal = {name: number(value, "a nominal value") for name, value in entry["nominal"].items()}
     limits = limits_of(model, section, states)
     check_names(model, plant, terms, assumed, nominal, limits, states)
-    watched = controller.get("observer") is not None
-    need(("observer" in entry) == watched, "members have an observer where the study asks for one, and only there")
     rate = number(controller.get("rates_hz", {}).get(entry["name"], controller["rate_hz"]), "rate_hz")
+    watched = observer_of(controller, entry, rate, terms, rows) if rate > 0 else ()
     transient = number(study["validation"]["transient_s"], "transient_s")
     need(rate > 0 and transient >= 0, "the control rate must be positive, the transient not negative")
     split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]]
@@ -58,6 +57,10 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     need([given["row"] for given in networks] == own, "the networks are not those of the gains")
     delay = number(controller["delay_s"], "delay_s")
     need(delay * rate <= MAX_DELAY, f"a computing delay is of at most {MAX_DELAY} periods")
+    need(not watched or gains[0][4] == 0, "a row with an observer has no load network")
+    need(
+        ("observed" in certificate) == bool(watched), "what an observer shows is bounded where there is one, only there"
+    )
     stroke = numbers(stroke_of(section, str(rows[0]["unit"])), 2, "stroke")
     return Claim(
         name=entry["name"], rows=rows, input_map=input_map, inputs=model["inputs"], plant=plant, law=terms,
@@ -78,7 +81,31 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
         transient=transient,
         feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
         first=model["first"], rest=rest_of(entry["reference"]["segments"], study["reference"]["dwell_s"]),
+        observer=watched, shown=numbers(certificate["observed"], 3, "observed") if watched else [],
     )  # fmt: skip
+
+
+def observer_of(
+    controller: dict[str, Any], entry: dict[str, Any], rate: Fraction, terms: list[dict[str, Any]],
+    rows: list[dict[str, Any]],
+) -> tuple[Fraction, ...]:  # fmt: skip
+    """l_1 and l_2 of a member's observer, which are those of the study's bandwidth; nothing where it has none."""
+    asked = controller.get("observer")
+    need(("observer" in entry) == (asked is not None), "members have an observer where the study asks for one")
+    if asked is None:
+        return ()
+    first, second = (number(entry["observer"][key], f"the observer's {key}") for key in ("first", "second"))
+    bandwidth = number(asked["bandwidth_rad_s"], "bandwidth_rad_s") if "bandwidth_rad_s" in asked else None
+    need(bandwidth is None or bandwidth > 0, "an observer's bandwidth is positive")
+    away = 1.0 if bandwidth is None else -math.expm1(-float(bandwidth / rate))
+    wanted = away * (2 - away), away**2 * float(rate)
+    close = all(abs(float(g) - w) <= 1e-6 * w for g, w in zip((first, second), wanted, strict=True))
+    need(close and 0 < first <= 1 and second > 0, "the observer's gains are not those of its bandwidth")
+    good = len(rows) > 1 and rows[1]["target"] == 0 and rows[0]["controlled"]
+    need(good, "an observer estimates the first state and the one that answers to it")
+    speed = [terms[0]["operations"][k] for k in terms[0]["outputs"]]
+    need(speed == [["input", "r1"]], "an observer is around the reference: the first modelling term must be its speed")
+    return first, second
 
 
 def rest_of(segments: list[dict[str, Any]], pause: Any) -> tuple[Fraction, Fraction]:
@@ -190,7 +217,7 @@ def assumptions(
 ) -> dict[str, dict[str, Interval]]:
     """The assumptions by kind; each must cover what the study states.
 
-    What a coupling does to a member, and what an observer measures, is decided by obligations of their own.
+    What a coupling does to a member is decided by obligations of its own.
     """
     kinds = ("parameter", "disturbance", "noise", "initial", "feedforward", "feedforward_rate")
     found: dict[str, dict[str, Interval]] = {kind: {} for kind in kinds}
@@ -254,9 +281,12 @@ def stated_ranges(
             need(state in given, f"the study does not say {kind} of {state}")
             value = number(given[state], f"{kind} of {state}")
             need(value >= 0, f"{kind} of {state} must not be negative")
+            if kind == "noise" and "resolution" in uncertainty:
+                step = number(uncertainty["resolution"].get(state, Fraction(0)), f"the resolution of {state}")
+                need(step >= 0, f"the resolution of {state} must not be negative")
+                value += step / 2
             need(not (kind == "noise" and k == 1 and observed) or value == 0, f"{state} is estimated, not measured")
-            if kind == "initial" or k > 1 or not observed:
-                stated.append((kind, state, -value, value))
+            stated.append((kind, state, -value, value))
     return stated
 
 

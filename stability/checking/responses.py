@@ -82,7 +82,7 @@ class Responses:
         return reach, times_up(times_up(reach, missed), reach)
 
     def _instants(self) -> None:
-        """Rows of the outputs (z, s, v) at both ends of every sub-step, each once, and of c."""
+        """Rows of the outputs (z, s, v) at both ends of every sub-step, each once; of c, and of an observer's."""
         turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
         flow = ball([[*row] for row in turn.flow[:n]])
         direct = ball([[Fraction(0)] * n + row for row in turn.direct])
@@ -102,8 +102,8 @@ class Responses:
                 ends.append(index[key])
             self.pairs.append((ends[0], ends[1]))
         rows = [row for part in made for row in part.rows]
-        chosen = [[int(c == n + j) << FIXED for c in range(turn.columns)] for j in range(q)]
-        self.rows = Ball([*rows, *chosen], max(part.error for part in made))
+        chosen = ball([*([Fraction(int(c == n + j)) for c in range(turn.columns)] for j in range(q)), *turn.shown])
+        self.rows = Ball([*rows, *chosen.rows], max(chosen.error, *(part.error for part in made)))
 
     def _groups(self) -> None:
         """Everything that acts in earlier periods, group by group; then the tail, and the period of the output."""
@@ -234,7 +234,7 @@ class Responses:
             square = -(-((h * h / 8).numerator << FIXED) // (h * h / 8).denominator)
             more = [[(v * square >> FIXED) + 1 for v in row] for row in curved]
             best = larger(best, added(larger(a, b), more))
-        return [*best, *values[len(values) - turn.q :]]
+        return [*best, *values[len(values) - turn.q - len(turn.shown) :]]
 
 
 class _Grid:

@@ -233,9 +233,8 @@ def _records(data: dict[str, Any], certified: dict[str, Fraction]) -> None:
         need(ends[0] <= bound, f"a recorded run passes what is proved of {entry['name']}")
         watched = study["controller"].get("observer") is not None
         need(("estimates" in own) == watched, "estimates are recorded where there is an observer, and only there")
-        noise = {a["name"]: a["upper"] for a in entry["assumptions"]}
-        for row, seen in zip(entry["model"]["rows"], own.get("estimates", []), strict=False):
-            inside = number(seen, "an estimate") <= number(noise[f"noise.{row['state']}"], "noise")
+        for seen, bound in zip(own.get("estimates", []), entry["certificate"].get("observed", []), strict=False):
+            inside = number(seen, "an estimate") <= number(bound, "observed")
             need(inside, f"a recorded estimate of {entry['name']} passes what is proved")
     names = [scenario["name"] for scenario in study["validation"]["scenarios"]]
     need([run["name"] for run in shown["scenarios"]] == names, "the recorded scenarios are not those of the study")

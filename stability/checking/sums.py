@@ -69,9 +69,12 @@ def length_of(values: list[int]) -> int:
 
 
 def norm_of(block: Whole) -> int:
-    """Spectral norm of a block of one or two rows, rounded up."""
+    """Spectral norm of a block of one or two rows, rounded up; of a larger one the bound by its rows and columns."""
     if len(block) == 1:
         return abs(block[0][0])
+    if len(block) > 2:
+        sums = [max(sum(map(abs, line)) for line in way) for way in (block, zip(*block, strict=True))]
+        return math.isqrt(sums[0] * sums[1]) + 1
     (a, b), (c, d) = block
     total, product = a * a + b * b + c * c + d * d, abs(a * d - b * c)
     # the largest σ² is half of t + sqrt(t² - 4 det²)

@@ -11,7 +11,7 @@ from .arithmetic import ZERO, Interval, add, down, mul, neg, up
 from .claim import Claim
 from .limits import FIXED, ROUNDING
 from .loop import Loop
-from .matrices import Ball, Matrix, ball, dot, exponential_of
+from .matrices import Ball, Matrix, ball, dot, exponential_of, identity
 
 #: Sub-steps of a period for outputs.
 PHASES = 5
@@ -28,18 +28,22 @@ class Turn:
     """The loop of constant numbers for a part of the inertias' ranges, and what it leaves out.
 
     Everything is in units of the box: z_i of half_widths_i, v_k of input_bound_k, φ̂ - φ* of network_bound_q, time of
-    the period. Z holds z, φ̂ - φ*, and the pending inputs, newest first; columns of maps are over Z, then pulses on the
-    new inputs, pulses on the networks, and measurement errors of the states.
+    the period. Z holds z, φ̂ - φ*, the states of an observer, and the pending inputs, newest first; columns of maps are
+    over Z, then pulses on the new inputs, on the networks and on what the observer sees, and measurement errors of the
+    states.
     """
 
     def __init__(self, claim: Claim, loop: Loop, masses: list[Interval]) -> None:
         self.claim, self.loop = claim, loop
         self.n, self.m, self.q = len(claim.rows), len(claim.inputs), len(claim.networks)
-        self.order = self.n + self.q + self.m * claim.pending
-        self.width = self.m + self.q + self.n
+        self.w = 2 if claim.observer else 0
+        self.first = self.n + self.q + self.w
+        self.order = self.first + self.m * claim.pending
+        self.width = self.m + self.q + self.w + self.n
         self.columns = self.order + self.width
         self._plant(masses)
         self._controller()
+        self._observer()
         self._flow()
         self._phases()
         self._sample()
@@ -111,6 +115,29 @@ class Turn:
         self.noise = [up(v / r) for v, r in zip(claim.noise, claim.half_widths, strict=True)]
         self.blur = [up(loop.term_noise(row) / claim.input_bound[k]) for k, row in enumerate(claim.input_map)]
 
+    def _observer(self) -> None:
+        """What the controller sees of z, over the columns; what is bounded of an observer, and rounding of its gains.
+
+        x̂ = ξ + l_1 (y - ξ), ŝ = η + l_2 (y - ξ); bounded are the errors of both, and y - ξ.
+        """
+        claim, unit, noise = self.claim, identity(self.columns), self.columns - self.n
+        self.seen = [_sum(unit[i], unit[noise + i]) for i in range(self.n)]
+        self.shown: Matrix = []
+        self.blind: list[Fraction] = []
+        if not claim.observer:
+            return
+        per = claim.half_widths[0] / claim.half_widths[1]
+        gains, place, pulse = (claim.observer[0], claim.observer[1] * per), self.n + self.q, noise - self.w
+        missed = [v - w for v, w in zip(self.seen[0], unit[place], strict=True)]
+        for i, gain in enumerate(gains):
+            self.seen[i] = _sum(unit[place + i], [gain * v for v in missed], unit[pulse + i])
+        errors = [[v - w for v, w in zip(self.seen[i], unit[i], strict=True)] for i in range(2)]
+        scale = *claim.half_widths[:2], claim.half_widths[0]
+        sizes = [r / bound for r, bound in zip(scale, claim.shown, strict=True)]
+        self.shown = [[v * size for v in row] for row, size in zip([*errors, missed], sizes, strict=True)]
+        self.blind = [up(ROUNDING * gain / sizes[2]) for gain in gains]
+        self.ahead = [[Fraction(1), claim.period / per], [Fraction(0), Fraction(1)]]
+
     def _flow(self) -> None:
         """(z, p)' = flow (z, p) + (b, 0) held; p is what each demand moves since the last sample."""
         claim, n, m, q = self.claim, self.n, self.m, self.q
@@ -129,15 +156,18 @@ class Turn:
 
     def held(self, k: int) -> Ball:
         """The input computed k samples ago, over the columns."""
-        n, m, q, order = self.n, self.m, self.q, self.order
-        rows = [[Fraction(0)] * self.columns for _ in range(m)]
-        for i, row in enumerate(rows):
-            if k:
-                row[n + q + m * (k - 1) + i] = Fraction(1)
-                continue
-            row[: n + q], row[order + m + q :] = self.act[i], self.act[i][:n]
-            row[order + i] = Fraction(1)
-        return ball(rows)
+        if k:
+            place = self.first + self.m * (k - 1)
+            return ball([[Fraction(int(c == place + i)) for c in range(self.columns)] for i in range(self.m)])
+        return ball([self._computed(row, self.order + i) for i, row in enumerate(self.act)])
+
+    def _computed(self, row: list[Fraction], own: int) -> list[Fraction]:
+        """What the controller makes of what it sees and of its networks, with a pulse of its own, over the columns."""
+        made = [dot(row[: self.n], column) for column in zip(*self.seen, strict=True)]
+        for j, value in enumerate(row[self.n :]):
+            made[self.n + j] += value
+        made[own] += 1
+        return made
 
     def _phases(self) -> None:
         """(z, p) and the held input at both ends of every sub-step, over the columns."""
@@ -172,30 +202,34 @@ class Turn:
         for i in range(n):
             fold[i][i] = Fraction(1)
         for j in range(q):
-            fold[n + j][n + j], kept[n + j][n + j] = Fraction(-1), Fraction(1)
-            for i, value in enumerate(self.learn[j]):
-                kept[n + j][i] += value
-            kept[n + j][order + m + q :] = self.learn[j][:n]
-            kept[n + j][order + m + j] = Fraction(1)
+            fold[n + j][n + j] = Fraction(-1)
+            kept[n + j] = self._computed(self.learn[j], order + m + j)
+            kept[n + j][n + j] += 1
+        for i in range(self.w):
+            kept[n + q + i] = [dot(self.ahead[i], column) for column in zip(*self.seen[:2], strict=True)]
         moved = ball(kept)
         for k in range(claim.pending):
             for i in range(m):
-                fold[n + q + m * k + i][n:] = self.direct[i]
+                fold[self.first + m * k + i][n:] = self.direct[i]
             held = self.held(k)
             for i in range(m):
-                moved.rows[n + q + m * k + i] = held.rows[i]
+                moved.rows[self.first + m * k + i] = held.rows[i]
         self.fold = ball(fold)
         self.image = self.fold @ self.end + moved
         # Z(0) over Q(0), c(0), measurement errors, errors of the modelling terms
         width = 2 * n + q + m
-        begin = [[*row, *([Fraction(0)] * (n + m))] for row in self.start]
-        begin += [[Fraction(int(c == n + j)) for c in range(width)] for j in range(q)]
+        unit = identity(width)
+        begin = [[*row, *[Fraction(0)] * (n + m)] for row in self.start]
+        first = [_sum(row, noise) for row, noise in zip(begin, unit[n + q : 2 * n + q], strict=True)]
+        if self.w:  # an observer starts from the first measurement, and at the reference's speed
+            first[1] = [Fraction(0)] * width
+        begin = [*begin, *unit[n : n + q], *first[: self.w]]
         for _ in range(claim.pending):
-            for k in range(m):
-                row = [sum((self.act[k][i] * self.start[i][c] for i in range(n)), Fraction(0)) for c in range(n + q)]
+            for k, row in enumerate(self.act):
+                made = [dot(row[:n], column) for column in zip(*first, strict=True)]
                 for j in range(q):
-                    row[n + j] += self.act[k][n + j]
-                begin.append([*row, *self.act[k][:n], *(Fraction(int(i == k)) for i in range(m))])
+                    made[n + j] += row[n + j]
+                begin.append(_sum(made, unit[2 * n + q + k]))
         self.begin = ball(begin)
 
     def started(self) -> tuple[list[Fraction], list[Fraction]]:
@@ -211,10 +245,14 @@ class Turn:
             first.append(up(max(away, self.loop.settled[j]) / claim.network_bound[j]))
         loose = [dot(row, first) for row in self.start_spread]
         size = [dot(map(abs, row), first) for row in self.start]
-        unsure = [up(v) for v in loose] + [Fraction(0)] * q
+        unsure = [up(v) for v in loose] + [Fraction(0)] * q + [up(v) for v in loose[: self.w]]
         felt = [z + w + noise for z, w, noise in zip(size, loose, self.noise, strict=True)] + first[n:]
         held = [up(dot(map(abs, self.act[k][:n]), loose) + dot(self.act_spread[k], felt)) for k in range(self.m)]
         return [*first, *self.noise, *self.blur], unsure + held * claim.pending
+
+
+def _sum(*rows: list[Fraction]) -> list[Fraction]:
+    return [sum(column, Fraction(0)) for column in zip(*rows, strict=True)]
 
 
 def _point(value: Fraction) -> Interval:

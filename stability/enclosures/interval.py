@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from math import isnan, nextafter
 
 _LOW, _HIGH = -math.inf, math.inf
 _FAR = 1e5
 
 
 def _down(value: float) -> float:
-    return math.nextafter(value, _LOW)
+    return nextafter(value, _LOW)
 
 
 def _up(value: float) -> float:
-    return math.nextafter(value, _HIGH)
+    return nextafter(value, _HIGH)
 
 
 def _libm(low: float, high: float) -> tuple[float, float]:
@@ -39,9 +40,9 @@ class Interval:
     __slots__ = ("high", "low")
 
     def __init__(self, low: float, high: float | None = None) -> None:
-        self.low = float(low)
-        self.high = self.low if high is None else float(high)
-        if not self.low <= self.high:
+        self.low = low = float(low)
+        self.high = high = low if high is None else float(high)
+        if not low <= high:
             raise ValueError(f"an interval needs lower <= upper: got [{low}, {high}]; swap or correct the ends")
 
     @staticmethod
@@ -63,16 +64,16 @@ class Interval:
         return Interval(-self.high, -self.low)
 
     def __add__(self, other: Interval) -> Interval:
-        return Interval(_down(self.low + other.low), _up(self.high + other.high))
+        return Interval(nextafter(self.low + other.low, _LOW), nextafter(self.high + other.high, _HIGH))
 
     def __sub__(self, other: Interval) -> Interval:
-        return Interval(_down(self.low - other.high), _up(self.high - other.low))
+        return Interval(nextafter(self.low - other.high, _LOW), nextafter(self.high - other.low, _HIGH))
 
     def __mul__(self, other: Interval) -> Interval:
-        ends = (self.low * other.low, self.low * other.high, self.high * other.low, self.high * other.high)
-        if any(end != end for end in ends):  # 0 times infinity: the member 0 makes it 0
-            ends = tuple(0.0 if end != end else end for end in ends)
-        return Interval(_down(min(ends)), _up(max(ends)))
+        a, b, c, d = self.low * other.low, self.low * other.high, self.high * other.low, self.high * other.high
+        if isnan(a + b + c + d):  # 0 times infinity: the member 0 makes it 0
+            a, b, c, d = (0.0 if isnan(end) else end for end in (a, b, c, d))
+        return Interval(nextafter(min(a, b, c, d), _LOW), nextafter(max(a, b, c, d), _HIGH))
 
     def __truediv__(self, other: Interval) -> Interval:
         if other.low <= 0.0 <= other.high:

@@ -12,8 +12,8 @@ Array = NDArray[np.float64]
 
 #: Eigenvalues this close, of what the larger is below 1, are a block; its coupling is that share of the same.
 CLOSE, SHARE = 0.1, 0.3
-#: Condition number of coordinates beyond which they are none.
-WORST = 1e8
+#: Condition number of coordinates beyond which they are none; largest block; a smaller imaginary part is none.
+WORST, MOST, TINY = 1e8, 4, 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +23,7 @@ class Basis:
     Attributes:
         columns: V. Shape (order, order).
         inverse: V^-1.
-        blocks: Sizes of the blocks, 1 or 2.
+        blocks: Sizes of the blocks, 1 to 4.
         norms: Bounds on the norms of the blocks of V^-1 F V. Shape (blocks, blocks).
     """
 
@@ -51,57 +51,72 @@ def basis_of(f: Array) -> Basis | None:
     found: Any = eig(balanced)
     values: Any = found[0]
     vectors: Any = found[1]
-    columns, blocks, done = [], [], set[int]()
-    for i in np.argsort(-np.abs(values)):
-        if int(i) in done:
-            continue
-        if abs(values[i].imag) > 1e-12:
-            partner = int(np.argmin(np.abs(values - values[i].conjugate())))
-            done |= {int(i), partner}
-            columns += [vectors[:, i].real, vectors[:, i].imag]
-            blocks.append(2)
+    columns, blocks = [], []
+    left = [int(i) for i in np.argsort(-np.abs(values)) if values[i].imag > -TINY]  # one of each conjugate pair
+    while left:
+        i = left.pop(0)
+        single, near, size = _size(values[i]) == 1, [], _size(values[i])
+        for k in left:
+            if _close(values[i], values[k]) and size + _size(values[k]) <= MOST:
+                near.append(k)
+                size += _size(values[k])
+        if near or (not single and _close(values[i], values[i].conjugate())):
+            left = [k for k in left if k not in near]
+            columns += list(_plane(balanced, values[[i, *near]]).T)
         else:
-            done.add(int(i))
-            columns.append(vectors[:, i].real)
-            blocks.append(1)
-    made, blocks = _paired(balanced, np.array(columns).T, blocks)
+            columns += [vectors[:, i].real] if single else [vectors[:, i].real, vectors[:, i].imag]
+        blocks.append(len(columns) - sum(blocks))
+    made = np.array(columns).T
     if np.linalg.cond(made) > WORST:
         return None
     return with_columns(f, scale @ made, tuple(blocks))
 
 
-def _paired(f: Array, columns: Array, blocks: list[int]) -> tuple[Array, list[int]]:
-    """Nearly equal real eigenvalues as a block: one eigenvector, and the direction to the other, short enough."""
-    kept, sizes, k, first = [], [], 0, 0
-    while k < len(blocks):
-        one = columns[:, first] / np.linalg.norm(columns[:, first])
-        if blocks[k] == 1 and k + 1 < len(blocks) and blocks[k + 1] == 1:
-            other = columns[:, first + 1] / np.linalg.norm(columns[:, first + 1])
-            other = other if other @ one > 0 else -other
-            apart = max(float(np.linalg.norm(other - one)), 1e-300)
-            values = [v @ f @ v for v in (one, other)]
-            room = max(1 - max(map(abs, values)), 1e-9)
-            if abs(values[1] - values[0]) < CLOSE * room:
-                reach = abs(values[1] - values[0]) / apart
-                kept += [one, (other - one) / apart * min(1.0, SHARE * room / max(reach, 1e-300))]
-                sizes.append(2)
-                k, first = k + 2, first + 2
-                continue
-        kept += list(columns[:, first : first + blocks[k]].T)
-        sizes.append(blocks[k])
-        first += blocks[k]
-        k += 1
-    return np.array(kept).T, sizes
+def _size(value: complex) -> int:
+    """Columns of an eigenvalue, and of its conjugate."""
+    return 2 if value.imag > TINY else 1
+
+
+def _close(one: complex, other: complex) -> bool:
+    return abs(one - other) < CLOSE * _room(np.array([one, other]))
+
+
+def _room(values: Any) -> float:
+    return max(1 - float(np.max(np.abs(values))), 1e-9)
+
+
+def _plane(f: Array, cluster: Any) -> Array:
+    """What nearly equal eigenvalues leave invariant: their eigenvectors are nearly the same, and tell it badly."""
+    from scipy.linalg import schur
+
+    one = np.eye(len(f))
+    wanted, count = one, sum(map(_size, cluster))
+    for value in cluster:
+        of_pair = f @ f - 2 * value.real * f + abs(value) ** 2 * one
+        wanted = wanted @ (of_pair if _size(value) == 2 else f - value.real * one)
+    plane = np.linalg.svd(wanted)[2][-count:].T
+    found: Any = schur(plane.T @ f @ plane)
+    form, turned = found
+    lengths = [1.0]
+    for j in range(1, count):  # every vector so short that it adds little of those before it
+        beside, back = max(float(np.max(np.abs(form[:j, j]))), 1e-300), abs(form[j, j - 1])
+        lengths.append(lengths[-1] * max(min(1.0, SHARE * _room(cluster) / beside), np.sqrt(back / beside)))
+    return np.asarray(plane @ turned @ np.diag(lengths), dtype=np.float64)
 
 
 def with_columns(f: Array, columns: Array, blocks: tuple[int, ...]) -> Basis:
     """The coordinates of given columns."""
     inverse = np.asarray(np.linalg.inv(columns), dtype=np.float64)
-    inside, ends = inverse @ f @ columns, np.cumsum((0, *blocks))
-    norms = np.array([
-        [np.linalg.norm(inside[r : r + p, c : c + q], 2) for c, q in zip(ends, blocks, strict=False)]
-        for r, p in zip(ends, blocks, strict=False)
-    ], dtype=np.float64)  # fmt: skip
+    # every block at the head of a square
+    count, side = len(blocks), max(blocks)
+    place = np.array([side * k + i for k, size in enumerate(blocks) for i in range(size)])
+    padded = np.zeros((side * count, side * count))
+    padded[np.ix_(place, place)] = inverse @ f @ columns
+    squares = padded.reshape(count, side, count, side).swapaxes(1, 2)
+    norms = np.asarray(np.linalg.norm(squares, 2, axis=(2, 3)), dtype=np.float64)
+    for k, size in enumerate(blocks):
+        if size > 2:  # as the checker bounds it
+            norms[k, k] = np.sqrt(np.linalg.norm(squares[k, k], 1) * np.linalg.norm(squares[k, k], np.inf))
     return Basis(columns=columns, inverse=inverse, blocks=blocks, norms=norms)
 
 

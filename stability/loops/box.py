@@ -29,6 +29,7 @@ class Box:
         high: Upper ends of φ*. Shape (q,).
         middle: What of a row's disturbance is constant and met by φ*, in the unit of h. Shape (q,).
         network_bound: Bounds on |φ̂ - φ*| at the samples. Shape (q,).
+        shown: Bounds on what an observer shows at the samples: ẑ_1 - z_1, ẑ_2 - z_2, correction. Shape (3,) or (0,).
     """
 
     half_widths: Array
@@ -37,6 +38,7 @@ class Box:
     high: Array
     middle: Array
     network_bound: Array
+    shown: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +63,7 @@ class DeviationRows:
         demand_rate: Bounds on |φ*'|. Shape (q,).
         settled: Bounds on |φ̂ - φ*| at rest: what a network cannot tell from the demand. Shape (q,).
         lean: Middles of the disturbances that are left in rows with a network, for the box's `middle`. Shape (q,).
+        measured: Bounds on the errors of what the controller knows of the states. Shape (n,).
     """
 
     low: Array
@@ -80,6 +83,7 @@ class DeviationRows:
     demand_rate: Array
     settled: Array
     lean: Array
+    measured: Array
 
     def sizes(self, deviations: Array, *, resting: bool) -> Array:
         """Bounds on |x_i| and |u_k| for bounds on |z_i| and |v_k|, in motion or while the reference rests.

@@ -21,6 +21,7 @@ from ..enclosures.form import ONE, Form
 from ..enclosures.interval import Interval, total
 from .box import Box, DeviationRows, UnboundedError, over
 from .model import Bounds, Gains, LoopModel
+from .observer import SHOWN
 from .rows import Builder
 
 Array = NDArray[np.float64]
@@ -38,8 +39,10 @@ def networks(model: LoopModel, gains: tuple[Gains, ...]) -> list[int]:
     return [i for i, g in zip(model.controlled, gains, strict=True) if g.gamma > 0]
 
 
-def first_box(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], half_widths: Array) -> Box:
-    """A box with the demands that the networks have to meet, and next to nothing for the inputs.
+def first_box(
+    model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], half_widths: Array
+) -> tuple[Box, DeviationRows]:
+    """A box with the demands that the networks have to meet, and next to nothing for the inputs; and its enclosures.
 
     Args:
         model: Plant and law.
@@ -54,15 +57,16 @@ def first_box(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], half_w
     box = Box(
         half_widths=half_widths, input_bound=np.full(len(model.inputs), NOTHING), low=-capacity, high=capacity,
         middle=np.zeros(len(capacity)), network_bound=np.full(len(capacity), NOTHING),
+        shown=np.full(SHOWN if bounds.observer is not None else 0, NOTHING),
     )  # fmt: skip
+    rows = deviation_rows(model, bounds, gains, box)
     for _ in range(SETTLING if len(capacity) else 0):
-        rows = deviation_rows(model, bounds, gains, box)
         # what is left leans to a side until its middle is met too
         following = replace(_demanding(box, rows), middle=rounded(box.middle + rows.lean))
         if all((getattr(box, key) == getattr(following, key)).all() for key in ("low", "high", "middle")):
             break
-        box = following
-    return box
+        box, rows = following, deviation_rows(model, bounds, gains, following)
+    return box, rows
 
 
 def _demanding(box: Box, rows: DeviationRows) -> Box:
@@ -124,6 +128,8 @@ class _Builder(Builder):
 
     def __init__(self, model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], box: Box) -> None:
         self.box, self.networks = box, networks(model, gains)
+        if bounds.observer is not None:
+            bounds = replace(bounds, noise=(*(float(v) for v in box.shown[:2]), *bounds.noise[2:]))
         super().__init__(model, bounds, gains, box.half_widths, box.input_bound)
         for k, i in enumerate(self.networks):
             self.symbols.ranges[f"p{i}"] = Interval(float(box.low[k]), float(box.high[k]))
@@ -177,7 +183,7 @@ class _Builder(Builder):
             demand=np.array([[d.range.low, d.range.high] for d in demands.values()]).reshape(-1, 2),
             demand_rate=np.array([d.rate for d in demands.values()]),
             settled=np.array([d.settled for d in demands.values()]),
-            lean=np.array([d.lean for d in demands.values()]),
+            lean=np.array([d.lean for d in demands.values()]), measured=np.array(self.bounds.noise),
         )  # fmt: skip
 
     def _demand(self, i: int, raw: Form, row: Form, mass: Interval, term_rates: dict[int, Form]) -> _Demand:

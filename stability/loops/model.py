@@ -8,6 +8,7 @@ from typing import Any
 
 from ..enclosures.expression import Expression
 from ..enclosures.interval import Interval
+from .observer import Observer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +105,7 @@ class Bounds:
             unless `nominal` has the name.
         delay: Computing delay in s: what is measured at t_k acts from t_k + delay on.
         rest: Where the reference rests at first, and for how long, s.
+        observer: What makes the first two states of the first one's measurement; None where all are measured.
     """
 
     parameters: Mapping[str, Interval]
@@ -117,3 +119,4 @@ class Bounds:
     feedforward: Mapping[str, tuple[Interval, Interval]] = field(default_factory=dict)
     delay: float = 0.0
     rest: tuple[float, float] = (0.0, 0.0)
+    observer: Observer | None = None

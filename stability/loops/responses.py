@@ -52,13 +52,13 @@ LONGEST = 400
 SHARES = (0.5, 0.8, 0.93)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Sums:
-    """L1 norms from what acts to the outputs (z, s, v, c).
+    """L1 norms from what acts to the outputs (z, s, v, c, and what is bounded of an observer).
 
     Attributes:
         rest: From ρ_1 … ρ_n and the rates of the demands. Shape (outputs, n + q).
-        pulses: From errors of the new inputs and of the networks. Shape (outputs, m + q).
+        pulses: From errors of the new inputs, of the networks and of an observer's ẑ. Shape (outputs, m + q + w).
         noise: From measurement errors. Shape (outputs, n).
         begin: Largest responses to what Z(0) is made of. Shape (outputs, 2 n + q + m).
     """
@@ -140,8 +140,7 @@ class _Sum:
         through = np.vstack([np.zeros((n, m)), stack.b, np.eye(m)])
         early = [self.cx @ x + through @ v for x, v in zip(one.begin[:-1], one.held, strict=True)]
         late = [self.cx @ x + through @ v for x, v in zip(one.begin[1:], one.held, strict=True)]
-        chosen = np.eye(order + m + q + n)[n : n + q]
-        self.rows = np.vstack([*early, *late, chosen])
+        self.rows = np.vstack([*early, *late, one.shown])
         inside = basis.inverse @ one.image[:, :order] @ basis.columns
         self.block = diagonal(inside, basis.blocks)
         self.step_back = self.block - np.eye(order)
@@ -163,24 +162,25 @@ class _Sum:
     def made(self, groups: tuple[int, ...]) -> tuple[Responses, float]:
         """The sums, and the largest share of those to the first output by which what is left may be overestimated."""
         n, m, q = self.stack.sizes
-        order, growths = self.stack.order, [1.0, *self.growths]
+        pulses, order, growths = m + q + self.stack.watched, self.stack.order, [1.0, *self.growths]
         past, totals, after = self._past(groups)
         done, counts = np.cumsum((0, *groups)), np.array(groups)[:, None, None]
         # what acts in period P meets period P + k + 1 with weight growth^(k + 1); a group has the weight of its end
         weights = np.array(growths)[:, None] ** done[1:]
         rest = self._integrals(counts, past, totals, weights)
-        felt, begun = self._discrete(counts, past, totals, weights, m + q + n)
+        felt, begun = self._discrete(counts, past, totals, weights, pulses + n)
         now, fixed = self._current(), np.abs(self.rows[:, order:])
         last = self.basis.of_rows(after)
-        sums, tails = [], [self._left(last, growth, growth ** float(done[-1])) for growth in growths]
-        for k, left in enumerate(tails):
-            acted = fixed + felt[k] + left[1][:, : m + q + n]
-            first = np.maximum(begun[k], left[2][:, m + q + n :])
-            sums.append(Sums(
-                rest=self._between(now + rest[k] + left[0], own=True),
-                pulses=self._between(acted[:, : m + q]), noise=self._between(acted[:, m + q :]),
-                begin=self._between(first),
-            ))  # fmt: skip
+        tails = [self._left(last, growth, growth ** float(done[-1])) for growth in growths]
+        values = np.array([
+            np.hstack([
+                now + rest[k] + left[0], fixed + felt[k] + left[1][:, : pulses + n],
+                np.maximum(begun[k], left[2][:, pulses + n :]),
+            ])
+            for k, left in enumerate(tails)
+        ])  # fmt: skip
+        ends = np.cumsum((n + q, pulses, n))
+        sums = [Sums(*np.split(part, ends, axis=1)) for part in self._between(values)]
         made = Responses(
             stack=self.stack, basis=self.basis, groups=groups, plain=sums[0],
             weighted=dict(zip(self.growths, sums[1:], strict=True)),
@@ -252,19 +252,20 @@ class _Sum:
         size = growth * last @ reach
         return size @ self.tail, size @ self.entry, last @ begun
 
-    def _between(self, values: Array, *, own: bool = False) -> Array:
-        """The largest value over all phases, from both ends of each sub-step, with the curvature between them."""
-        n, _, q = self.stack.sizes
-        size, count = self.outputs, len(self.one.steps)
-        early = values[: count * size].reshape(count, size, -1)
-        late = values[count * size : 2 * count * size].reshape(count, size, -1)
-        best = np.zeros((size, values.shape[1]))
+    def _between(self, values: Array) -> Array:
+        """The largest values over all phases, from both ends of each sub-step, with the curvature between them.
+
+        Args:
+            values: By growth, at both ends of all sub-steps; of sources, which bend it themselves, and of the rest.
+        """
+        (n, _, q), size, steps = self.stack.sizes, self.outputs, self.one.steps
+        shape = (len(values), len(steps), size, values.shape[2])
+        early, late = np.split(values[:, : 2 * len(steps) * size], 2, axis=1)
+        early, late = early.reshape(shape), late.reshape(shape)
+        speed = np.zeros((*shape[:2], n + q, shape[3]))
+        speed[:, :, :n] = early[:, :, n : 2 * n]
+        speed[..., : n + q] += np.abs(self.sources)
         bend = np.abs(self.cx @ self.flow)
-        for j, h in enumerate(self.one.steps):
-            speed = np.zeros((n + q, values.shape[1]))
-            speed[:n] = early[j, n : 2 * n]
-            if own:
-                speed += np.abs(self.sources)
-            curved = h**2 / 8 * (bend @ self._step(float(h)).ceiling @ speed)
-            best = np.maximum(best, np.maximum(early[j], late[j]) + curved)
-        return np.vstack([best, values[2 * count * size :]])
+        bends = np.array([h**2 / 8 * (bend @ self._step(float(h)).ceiling) for h in steps])
+        best = (np.maximum(early, late) + bends @ speed).max(axis=1)
+        return np.concatenate([best, values[:, 2 * len(steps) * size :]], axis=1)

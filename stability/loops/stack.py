@@ -1,9 +1,10 @@
 """One control period of the whole sampled loop: plant deviations, load networks and pending inputs as one exact map.
 
-    z' = a z + b v + ρ,   p_k' = φ*_k',   v = held + p,      Z = (z, c, pending inputs, newest first)
+    z' = a z + b v + ρ,   p_k' = φ*_k',   v = held + p,      Z = (z, c, w, pending inputs, newest first)
 
 inside a period, where p is what a demand moves since the last sample; z_i' gets φ*_j' where row i tracks a row j with
-a network. At a sample v_new = -K z - C c, c <- A c + G z - p, the pending inputs move on by one and by p. With a delay
+a network. At a sample v_new = -K ẑ - C c, c <- A c + G ẑ - p, the pending inputs move on by one and by p. ẑ is z as it
+is measured, or for the first two states what an observer with the states w makes of the first. With a delay
 of so many whole periods and a share, the input switches from one pending value to the next at that share of a period.
 """
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from .box import DeviationRows
 from .deviation import ROUNDED, networks
 from .model import Gains, LoopModel
+from .observer import SHOWN, STATES, Observer
 
 Array = NDArray[np.float64]
 
@@ -141,6 +143,7 @@ class Stack:
         period: T, s.
         whole: Whole periods of delay.
         share: The rest of the delay as a share of the period, 0 or more and below 1.
+        observer: What makes ẑ_1 and ẑ_2 of z_1; None where all are measured.
     """
 
     a: Array
@@ -151,6 +154,17 @@ class Stack:
     period: float
     whole: int
     share: float
+    observer: Observer | None = None
+
+    @property
+    def watched(self) -> int:
+        """Number of states w of the observer."""
+        return STATES if self.observer is not None else 0
+
+    @property
+    def shown(self) -> int:
+        """Number of outputs of the observer: ẑ_1 - z_1, ẑ_2 - z_2, and what w corrects itself by."""
+        return SHOWN if self.observer is not None else 0
 
     @property
     def pending(self) -> int:
@@ -166,7 +180,22 @@ class Stack:
     def order(self) -> int:
         """Length of Z."""
         n, m, q = self.sizes
-        return n + q + m * self.pending
+        return n + q + self.watched + m * self.pending
+
+    def seen(self) -> tuple[Array, Array]:
+        """ẑ over z, measurement errors alike, and over w. Shapes (n, n), (n, w)."""
+        n = self.sizes[0]
+        of_states, of_observer = np.eye(n), np.zeros((n, self.watched))
+        if self.observer is not None:
+            first, second = self.observer.first, self.observer.second
+            of_states[:2], of_observer[:2] = 0.0, [[1 - first, 0.0], [-second, 1.0]]
+            of_states[:2, 0] = first, second
+        return of_states, of_observer
+
+    @property
+    def ahead(self) -> Array:
+        """W after a sample over ẑ_1 and ẑ_2. Shape (2, 2)."""
+        return np.array([[1.0, self.period], [0.0, 1.0]])
 
     def begin(self) -> Array:
         """Z(0) over what it is made of: Q(0), c(0), measurement errors, and errors of the inputs.
@@ -176,9 +205,13 @@ class Stack:
         (n, m, q), ctl = self.sizes, self.control
         made = np.zeros((self.order, 2 * n + q + m))
         made[:n, : n + q], made[n : n + q, n : n + q] = ctl.start, np.eye(q)
-        first = np.hstack([-ctl.feedback @ ctl.start, -ctl.feedback, np.eye(m)])
+        if self.observer is not None:
+            made[n + q, : n + q], made[n + q, n + q] = ctl.start[0], 1.0
+        of_states, of_observer = self.seen()
+        first = -ctl.feedback @ (of_states @ made[:n] + of_observer @ made[n + q : n + q + self.watched])
         first[:, n : n + q] -= ctl.network
-        made[n + q :] = np.tile(first, (self.pending, 1))
+        first[:, n + q :] += np.hstack([-ctl.feedback @ of_states, np.eye(m)])
+        made[n + q + self.watched :] = np.tile(first, (self.pending, 1))
         return made
 
     def flow(self) -> Array:
@@ -215,7 +248,8 @@ def wiring(model: LoopModel, own: Sequence[int]) -> tuple[Array, Array]:
 class Turn:
     """A period of a stack on a grid of sub-steps that holds the switch of the input.
 
-    Columns are over Z, then pulses on the new inputs, pulses on the networks, and measurement errors of the states.
+    Columns are over Z, then pulses on the new inputs, on the networks and on ẑ of an observer, and measurement errors
+    of the states.
 
     Attributes:
         steps: Length of each sub-step, s.
@@ -223,6 +257,7 @@ class Turn:
         held: The input that acts in each sub-step. Shape (steps, m, columns).
         image: Z at the next sample. Shape (order, columns).
         fold: How (z, p) at the end of a period enters Z. Shape (order, n + q).
+        shown: c, and what is bounded of an observer, at a sample. Shape (q + 3 or q, columns).
     """
 
     steps: Array
@@ -230,6 +265,7 @@ class Turn:
     held: Array
     image: Array
     fold: Array
+    shown: Array
 
 
 def turn(stack: Stack, count: int) -> Turn:
@@ -237,20 +273,21 @@ def turn(stack: Stack, count: int) -> Turn:
     from scipy.linalg import expm
 
     n, m, q = stack.sizes
-    order, waiting, ctl = stack.order, stack.pending, stack.control
-    columns = order + m + q + n
-    pulse, learn, noise = slice(order, order + m), slice(order + m, order + m + q), slice(order + m + q, columns)
-    fresh = np.zeros((m, columns))
-    fresh[:, :n], fresh[:, n : n + q], fresh[:, pulse] = -ctl.feedback, -ctl.network, np.eye(m)
-    fresh[:, noise] = -ctl.feedback
+    order, waiting, watched, ctl = stack.order, stack.pending, stack.watched, stack.control
+    columns, first = order + m + q + watched + n, n + q + watched
+    unit = np.eye(columns)
+    pulse, learn, astray, noise = np.split(unit[order:], np.cumsum((m, q, watched)))
+    of_states, of_observer = stack.seen()
+    seen = of_states @ (unit[:n] + noise) + of_observer @ unit[n + q : first]
+    seen[:watched] += astray
+    networks = unit[n : n + q]
+    fresh = pulse - ctl.feedback @ seen - ctl.network @ networks
 
     def waited(k: int) -> Array:
         """The input computed k samples ago."""
         if k == 0:
             return fresh
-        held = np.zeros((m, columns))
-        held[:, n + q + m * (k - 1) : n + q + m * k] = np.eye(m)
-        return held
+        return unit[first + m * (k - 1) : first + m * k]
 
     parts = [(stack.share, waited(stack.whole + 1))] if stack.share > 0 else []
     parts.append((1 - stack.share, waited(stack.whole)))
@@ -273,13 +310,15 @@ def turn(stack: Stack, count: int) -> Turn:
     fold[:n, :n] = np.eye(n)
     fold[n : n + q, n:] = -np.eye(q)
     for k in range(waiting):
-        fold[n + q + m * k : n + q + m * (k + 1), n:] = stack.direct
+        fold[first + m * k : first + m * (k + 1), n:] = stack.direct
     image = fold @ x
-    kept = image[n : n + q]
-    kept[:, :n] += ctl.entry
-    kept[:, n : n + q] += ctl.keep
-    kept[:, learn] += np.eye(q)
-    kept[:, noise] += ctl.entry
+    image[n : n + q] += learn + ctl.entry @ seen + ctl.keep @ networks
+    image[n + q : first] += stack.ahead[:watched] @ seen[:2] if watched else 0.0
     for k in range(waiting):
-        image[n + q + m * k : n + q + m * (k + 1)] += waited(k)
-    return Turn(steps=np.array(steps), begin=np.array(begin), held=np.array(acting), image=image, fold=fold)
+        image[first + m * k : first + m * (k + 1)] += waited(k)
+    shown = networks
+    if watched:
+        shown = np.vstack([networks, (seen - unit[:n])[:2], unit[0] + noise[0] - unit[n + q]])
+    return Turn(
+        steps=np.array(steps), begin=np.array(begin), held=np.array(acting), image=image, fold=fold, shown=shown
+    )

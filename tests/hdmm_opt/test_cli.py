@@ -85,7 +85,6 @@ def test_gain_files_match_their_published_schema(path):
     schema = json.loads((resources.files("hdmm_opt") / "schema" / "gains-2.schema.json").read_text(encoding="utf-8"))
     validator = jsonschema.Draft202012Validator(schema)
     validator.validate(data)
-    assert checker.check_file(path).status == 0
     for key in list(schema["required"]):
         assert not validator.is_valid({k: v for k, v in data.items() if k != key})
 

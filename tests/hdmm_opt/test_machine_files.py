@@ -169,9 +169,7 @@ def _seen(d):
 
 
 def _observer(d):
-    member(d, "lift")["observer"] = {
-        "first": 0.1, "second": 1.0, "largest": 0.0, "period_s": 1e-3, "epsilon": 1.0, "sigma": 1.0, "pole": "0.9",
-    }  # fmt: skip
+    member(d, "lift")["observer"] = {"first": 0.1, "second": 1.0}
 
 
 def _noise_of_nothing(d):

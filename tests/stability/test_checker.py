@@ -335,7 +335,7 @@ MUTATIONS = {
     "a coupling of one that is not there": at_top("couplings", value=[{"members": ["other"]}]),
     "a coupling without loads": at_top("couplings", value=[{"members": ["actuator"]}]),
     "an observer that is not there": in_study("controller", "observer", value={
-        "bandwidth_rad_s": 100.0, "largest": 0.1, "epsilon": 0.0, "sigma": 10.0}),
+        "bandwidth_rad_s": 100.0}),
     "a weaker actuator": in_drive("least_effectiveness", value=0.5),
     "wider stated bounds": set_at("reference", "derivative_bounds", 3, "upper", value=1e9),
     "limit on nothing": set_at("model", "limits", 1, "signals", value=[]),

@@ -1,102 +1,65 @@
-"""The observer obligation against exact peak gains."""
+"""The observer in the loop: its poles, its differences, and the loop with it against its exact worst case."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
+from known_answers import DISTURBANCE, certify_impulse_chain, claim_of, verdict
+from test_random_loops import model_of, watched_case
 
-from stability.networks.observer import SampledObserver, observer_bounds, sampled_bounds
+from stability import Observer, certify_impulse
 
-
-def peak_gain(first, second, column, output, horizon=40.0):
-    """L1 norm of the impulse response, by exact steps."""
-    a = np.array([[-first, 1.0], [-second, 0.0]])
-    step = horizon / first / 40_000
-    advance, state, total = expm(a * step), np.array(column, dtype=float), 0.0
-    for _ in range(40_000):
-        following = advance @ state
-        total += step * (abs(state[output]) + abs(following[output])) / 2
-        state = following
-    return total
+ROUND = 1e-8
 
 
-@pytest.mark.parametrize("frequency", [50.0, 300.0])
-def test_bounds_are_above_the_exact_peaks_and_near_them(frequency):
-    first, second = 2.0 * frequency, frequency**2
-    found = observer_bounds(first, second, noise=1e-6, disturbance=0.5)
-    noise, push = (first, second), (0.0, 1.0)
-    assert peak_gain(first, second, noise, 1) < found.amplification < 1.8 * peak_gain(first, second, noise, 1)
-    assert peak_gain(first, second, push, 1) < found.sensitivity < 1.6 * peak_gain(first, second, push, 1)
-    speed = 1e-6 * peak_gain(first, second, noise, 1) + 0.5 * peak_gain(first, second, push, 1)
-    position = 1e-6 * peak_gain(first, second, noise, 0) + 0.5 * peak_gain(first, second, push, 0)
-    assert speed < found.speed < 1.9 * speed and position < found.position < 1.9 * position
+def own_dynamics(observer: Observer, period: float) -> np.ndarray:
+    """(ξ, η) after a period without a measurement."""
+    seen = np.array([[1 - observer.first, 0.0], [-observer.second, 1.0]])
+    return np.array([[1.0, period], [0.0, 1.0]]) @ seen
 
 
-def test_faster_observers_trade_disturbance_for_noise():
-    slow = observer_bounds(100.0, 2500.0, noise=1e-6, disturbance=0.5)
-    fast = observer_bounds(400.0, 40_000.0, noise=1e-6, disturbance=0.5)
-    assert fast.sensitivity < slow.sensitivity and fast.amplification > 3 * slow.amplification
+@pytest.mark.parametrize(("bandwidth", "period"), [(10.0, 1e-3), (500.0, 1e-3), (6000.0, 62.5e-6), (3.0, 0.1)])
+def test_a_bandwidth_is_a_double_pole(bandwidth, period):
+    poles = np.linalg.eigvals(own_dynamics(Observer.of_bandwidth(bandwidth, period), period))
+    assert poles == pytest.approx(np.full(2, np.exp(-bandwidth * period)), abs=np.sqrt(ROUND))
 
 
-def test_an_uncertain_encoder_costs_and_too_much_of_it_is_refused():
-    known = observer_bounds(100.0, 2500.0, noise=1e-6, disturbance=0.5)
-    uncertain = observer_bounds(100.0, 2500.0, noise=1e-6, disturbance=0.5, spread=0.1)
-    assert known.speed < uncertain.speed
-    assert observer_bounds(20.0, 10_000.0, noise=1e-6, disturbance=0.5, spread=0.95) is None
+def test_without_a_bandwidth_speed_is_the_difference_of_two_measurements():
+    observer, measured, before = Observer.of_bandwidth(None, 2e-3), [1.0, 1.5, 1.2, 1.9], np.array([1.0, 0.0])
+    for last, now in pairwise(measured):
+        missed = now - before[0]
+        position, speed = before[0] + observer.first * missed, before[1] + observer.second * missed
+        assert position == pytest.approx(now) and speed == pytest.approx((now - last) / 2e-3)
+        before = np.array([position + 2e-3 * speed, speed])
 
 
-def test_gains_that_make_no_sense_are_refused():
-    for gains in ((0.0, 1.0), (1.0, -1.0), (float("nan"), 1.0)):
-        with pytest.raises(ValueError, match="positive gains"):
-            observer_bounds(*gains, noise=1e-6, disturbance=0.5)
+@pytest.mark.parametrize("first", [0.0, -0.1, 1.5, float("nan")])
+def test_gains_of_no_observer_are_refused(first):
+    with pytest.raises(ValueError, match="an observer needs"):
+        Observer(first=first, second=1.0)
 
 
-def worst_sampled(observer, noise, acceleration, samples=1500):
-    """Exact worst case of a sampled observer with constant gain: L1 norms of its impulse responses."""
-    t = observer.period
-    a = np.array([[1 - observer.first, t], [-observer.second, 1.0]])
-    # |x'' - a| <= A moves (x, x') by at most A times the integral of |e_i' exp(..)|, here by its extremes over a period
-    columns = [(noise * np.array([observer.first, observer.second]), 1)]
-    steps = 20
-    fine = t / steps
-    columns += [(acceleration * fine * np.array([t - (k + 0.5) * fine, 1.0]), 1) for k in range(steps)]
-    total = np.zeros(2)
-    for column, _ in columns:
-        state = np.array(column, dtype=float)
-        for _ in range(samples):
-            total += np.abs(state)
-            state = a @ state
-    return total
+@pytest.mark.parametrize("bandwidth", [None, 3000.0, 600.0])
+def test_without_noise_a_load_costs_what_it_costs_at_rest(bandwidth):
+    """The response to a load keeps its sign, so that its worst course is a constant one: D / (ω_1 ω_2) at rest."""
+    observer = Observer.of_bandwidth(bandwidth, 1e-3)
+    found = certify_impulse_chain((10.0, 60.0), period=1e-3, spread=0.0, observer=observer)
+    assert 1.0 <= found.ultimate[0] / (DISTURBANCE / (10.0 * 60.0)) < 1.01
 
 
-@pytest.mark.parametrize(
-    ("bandwidth", "period", "noise", "factor"),
-    [(6000.0, 1 / 16000, 5e-9, 2.0), (300.0, 1e-3, 1e-7, 1.6), (6000.0, 1 / 16000, 1e-7, 4.0)],
-)
-def test_sampled_bounds_are_above_the_exact_worst_case_and_near_it(bandwidth, period, noise, factor):
-    """Near it where the acceleration dominates; noise alone enters both rows, and costs several times its worst."""
-    observer = SampledObserver.of_bandwidth(bandwidth, 0.0, period)
-    found = sampled_bounds(observer, noise=noise, acceleration=1.0, initial=0.0)
-    exact = worst_sampled(observer, noise, 1.0)
-    assert exact[0] < found.position < factor * exact[0]
-    assert exact[1] < found.speed < factor * exact[1]
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_sampled_bounds_hold_while_the_adaptive_gain_moves(seed):
-    random, t = np.random.default_rng(seed), 1 / 16000
-    observer = SampledObserver.of_bandwidth(6000.0, 0.15, t)
-    found = sampled_bounds(observer, noise=5e-9, acceleration=1.0, initial=1e-4)
-    error, a, noise = np.array([5e-9, 1e-4]), 1.0, 5e-9
-    for _ in range(4000):
-        assert abs(error[0]) <= found.position and abs(error[1]) <= found.speed
-        a, noise = (v if random.random() < 0.9 else -v for v in (a, noise))
-        gain = 1 + random.choice((0.0, random.random(), 1.0)) * observer.largest
-        inward = gain * np.array([observer.first, observer.second]) * (error[0] + noise)
-        error = np.array([[1, t], [0, 1]]) @ error - inward + a * np.array([t * t / 2, t])
-
-
-def test_an_observer_that_does_not_contract_is_refused():
-    assert sampled_bounds(SampledObserver(first=0.5, second=900.0, largest=8.0, period=1e-3), noise=1e-6,
-                          acceleration=1.0, initial=0.0) is None  # fmt: skip
-    with pytest.raises(ValueError, match="positive gains and period"):
-        SampledObserver(first=0.0, second=1.0, largest=0.1, period=1e-3)
+@pytest.mark.parametrize("seed", [1, 13, 19])
+def test_the_checker_refuses_a_loop_with_another_observer(seed):
+    case = watched_case(seed)
+    model = model_of(case)
+    found = certify_impulse(model, case.bounds, case.gains, case.limit)
+    claim = claim_of(model, case.bounds, case.gains, found, limit=1e30, accuracy=1e30)
+    assert verdict(claim)
+    first, second = claim.observer
+    shown = claim.shown
+    changes = (
+        {"observer": (first, second * 2)}, {"observer": (first / 2, second / 2)},
+        *({"shown": [*shown[:k], shown[k] * 99 / 100, *shown[k + 1 :]]} for k in (0, 1)),
+        {"noise": [claim.noise[0] * 2, *claim.noise[1:]]},
+    )  # fmt: skip
+    for change in changes:
+        assert not verdict(type(claim)(**{**claim.__dict__, **change})), change

@@ -428,6 +428,18 @@ def slow_observer(d):
     d["study"]["controller"]["observer"]["bandwidth_rad_s"] = 1.0
 
 
+def differences(d):
+    del d["study"]["controller"]["observer"]["bandwidth_rad_s"]
+
+
+def sharper_estimate(d):
+    d["members"][0]["certificate"]["observed"][1] = "1/10000000"
+
+
+def no_observer(d):
+    del d["study"]["controller"]["observer"]
+
+
 def half_a_current(d):
     d["members"][0]["model"]["limits"][1]["signals"] = ["i_d"]
 
@@ -448,7 +460,8 @@ MACHINES = {
     "bodies without weight": ("arm-p3", loads_of_bodies_without_weight),
     "a payload of any course": ("arm-p3", payload_of_any_course), "joints in another order": ("arm-p3", other_order),
     "a noise that is estimated": ("crane-p4", noisy_speed), "a slower observer": ("crane-p4", slow_observer),
-    "a limit on half the current": ("crane-p4", half_a_current),
+    "a limit on half the current": ("crane-p4", half_a_current), "no observer": ("crane-p4", no_observer),
+    "differences for an observer": ("crane-p4", differences), "a sharper estimate": ("crane-p4", sharper_estimate),
 }  # fmt: skip
 
 
