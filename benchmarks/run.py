@@ -137,7 +137,7 @@ def growth() -> None:
     searches, checks = [], []
     for name, model, bounds, values, box, cells in ways:
         for count in cells:
-            cut = Cut(1e-9, count, count)
+            cut = Cut(1e-9, count, count, count)
             search = lambda m=model, b=bounds, v=values, w=box, c=cut: Search(m, b, v, w, c).run(b)  # noqa: E731
             made = search()
             assert isinstance(made, Impulse), (name, made)

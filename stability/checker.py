@@ -76,6 +76,12 @@ matrices: Matrices in fixed point with one bound on all their errors, and exact 
 
   Theorem: |a b - a' b'| <= |a| |b - b'| + |a - a'| |b| + |a - a'| |b - b'|; the remainder of an exponential's series.
 
+jitter: An input that acts earlier or later than it should.
+
+  Theorem: while another input acts than the nominal one, for a time of at most the jitter, z' differs by b times the
+  change of the input and by what the uncertainty makes of that; so z is kicked by at most an integral of e^{|a| s}.
+  Must fail: a larger jitter, one that is longer than the delay.
+
 turn: One control period of the whole sampled loop: plant, load networks and pending inputs as one exact map.
 
   Theorem: variation of constants. Must fail: another delay, a network or a pending input left out.
@@ -1065,7 +1071,7 @@ STUDY = entry_of(
             {"law": text, "modelling": listed(some(*MODELLING), 0, 8), "rate_hz": plain_number,
              "rates_hz": named(plain_number), "delay_s": share,
              "gains": NOTHING, "members": named(named(RANGE))},
-            {"observer": entry_of({}, {"bandwidth_rad_s": plain_number})},
+            {"observer": entry_of({}, {"bandwidth_rad_s": plain_number}), "jitter_s": positive},
         ),
         "requirements": entry_of(
             {"tracking_error_m": plain_number, "member_error": named(plain_number)},
@@ -1231,6 +1237,7 @@ class Claim:
     first: str = "position"
     rest: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0))
     observer: tuple[Fraction, ...] = ()
+    jitter: Fraction = Fraction(0)
     shown: list[Fraction] = field(default_factory=list)
 
     @property
@@ -1261,7 +1268,7 @@ class Claim:
     @property
     def pending(self) -> int:
         """Samples whose inputs are still to act."""
-        return self.whole + (self.share > 0)
+        return self.whole + (self.share > 0 or self.jitter > 0)
 
 
 def cell_of(entry: dict[str, Any]) -> Cell:
@@ -1783,6 +1790,8 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     need([given["row"] for given in networks] == own, "the networks are not those of the gains")
     delay = number(controller["delay_s"], "delay_s")
     need(delay * rate <= MAX_DELAY, f"a computing delay is of at most {MAX_DELAY} periods")
+    jitter = number(controller.get("jitter_s", Fraction(0)), "jitter_s")
+    need(0 <= jitter <= delay and 2 * jitter * rate < 1, "jitter is at most the delay, and less than half a period")
     need(not watched or gains[0][4] == 0, "a row with an observer has no load network")
     need(
         ("observed" in certificate) == bool(watched), "what an observer shows is bounded where there is one, only there"
@@ -1807,7 +1816,7 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
         transient=transient,
         feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
         first=model["first"], rest=rest_of(entry["reference"]["segments"], study["reference"]["dwell_s"]),
-        observer=watched, shown=numbers(certificate["observed"], 3, "observed") if watched else [],
+        jitter=jitter, observer=watched, shown=numbers(certificate["observed"], 3, "observed") if watched else [],
     )  # fmt: skip
 
 
@@ -2222,8 +2231,11 @@ class Loop:
 
     def late(self, k: int) -> Fraction:
         """What the modelling term of input k changes until it acts."""
-        change = magnitude(self.table.over(self.virtual[self.claim.input_map[k]]))
-        return (self.claim.period + self.claim.delay) * change
+        return (self.claim.period + self.claim.delay + self.claim.jitter) * self.drift(k)
+
+    def drift(self, k: int) -> Fraction:
+        """Bound on the rate of the modelling term of input k."""
+        return magnitude(self.table.over(self.virtual[self.claim.input_map[k]]))
 
     def size(self, name: str, deviations: list[Fraction], *, resting: bool) -> Fraction:
         """Bound on |input| as commanded, or on |state|, for bounds on |z| and |v|, in motion or at rest at first."""
@@ -2353,6 +2365,42 @@ def exponential_of(matrix: Matrix) -> Ball:
     return Ball(total, 1 << (FIXED - 113))
 
 
+# --- jitter ---
+
+class Jitter:
+    """For a change of 1 of each input: kicks to z, and |z'| meanwhile; what a kick makes of z until it is over.
+
+    `changed` is the part of a change that the modelling terms make. Everything is in units of the box.
+    """
+
+    def __init__(self, turn: Any) -> None:
+        claim, n = turn.claim, turn.n
+        late, size = claim.jitter / claim.period, [[abs(v) for v in row] for row in turn.a]
+        block = [[late * v for v in (*row, *unit)] for row, unit in zip(size, identity(n), strict=True)]
+        forward = exponential_of([*block, *[[Fraction(0)] * (2 * n)] * n]).part(slice(0, n), slice(None))
+        grown = [[up(Fraction(v, 1 << FIXED)) for v in row] for row in forward.sizes()]
+        self.grown, area = [row[:n] for row in grown], [row[n:] for row in grown]
+        more = [1 + change for change in turn.change]
+        worse = [[turn.change[i] * size[i][j] + more[i] * turn.a_spread[i][j] for j in range(n)] for i in range(n)]
+        driven = [[more[i] * (abs(v) + w) for v, w in zip(turn.b[i], turn.b_spread[i], strict=True)] for i in range(n)]
+        grows = inverse_of(_combined(identity(n), _times(area, worse), -1))
+        if min(v for row in grows for v in row) < 0:  # not the sum of a series
+            raise NotProvedError("the uncertainty is too large for this jitter")
+        self.kicks = [[up(v) for v in row] for row in _times(grows, _times(area, driven))]
+        self.sudden = _combined(driven, _times(_combined(size, worse, 1), self.kicks), 1)
+        sizes = zip(range(turn.m), claim.input_bound, strict=True)
+        self.changed = [up(claim.period * turn.loop.drift(k) / bound) for k, bound in sizes]
+
+
+def _times(left: Matrix, right: Matrix) -> Matrix:
+    columns = list(zip(*right, strict=True))
+    return [[dot(row, column) for column in columns] for row in left]
+
+
+def _combined(left: Sequence[Sequence[Fraction]], right: Matrix, sign: int) -> Matrix:
+    return [[a + sign * b for a, b in zip(*rows, strict=True)] for rows in zip(left, right, strict=True)]
+
+
 # --- turn ---
 
 #: Sub-steps of a period for outputs.
@@ -2371,8 +2419,8 @@ class Turn:
 
     Everything is in units of the box: z_i of half_widths_i, v_k of input_bound_k, φ̂ - φ* of network_bound_q, time of
     the period. Z holds z, φ̂ - φ*, the states of an observer, and the pending inputs, newest first; columns of maps are
-    over Z, then pulses on the new inputs, on the networks and on what the observer sees, and measurement errors of the
-    states.
+    over Z, then pulses on the new inputs, on the networks and on what the observer sees, kicks of jitter to the states,
+    and measurement errors of the states.
     """
 
     def __init__(self, claim: Claim, loop: Loop, masses: list[Interval]) -> None:
@@ -2381,11 +2429,13 @@ class Turn:
         self.w = 2 if claim.observer else 0
         self.first = self.n + self.q + self.w
         self.order = self.first + self.m * claim.pending
-        self.width = self.m + self.q + self.w + self.n
+        self.kicked, self.turns = (self.n, self.m) if claim.jitter > 0 else (0, 0)
+        self.width = self.m + self.q + self.w + self.kicked + self.n
         self.columns = self.order + self.width
         self._plant(masses)
         self._controller()
         self._observer()
+        self.jitter = Jitter(self) if claim.jitter > 0 else None
         self._flow()
         self._phases()
         self._sample()
@@ -2469,7 +2519,11 @@ class Turn:
         if not claim.observer:
             return
         per = claim.half_widths[0] / claim.half_widths[1]
-        gains, place, pulse = (claim.observer[0], claim.observer[1] * per), self.n + self.q, noise - self.w
+        gains, place, pulse = (
+            (claim.observer[0], claim.observer[1] * per),
+            self.n + self.q,
+            noise - self.kicked - self.w,
+        )
         missed = [v - w for v, w in zip(self.seen[0], unit[place], strict=True)]
         for i, gain in enumerate(gains):
             self.seen[i] = _sum(unit[place + i], [gain * v for v in missed], unit[pulse + i])
@@ -2496,12 +2550,22 @@ class Turn:
                 if claim.rows[i]["target"] == row:
                     self.sources[i][n + j] = bounds[j] / claim.half_widths[i]
 
+    def turned(self) -> Matrix:
+        """How much the inputs change that act in a period, over the columns; only with jitter."""
+        if not self.kicked:
+            return []
+        old, new = self._waited(self.claim.whole + 1), self._waited(self.claim.whole)
+        return [[v - w for v, w in zip(*rows, strict=True)] for rows in zip(new, old, strict=True)]
+
     def held(self, k: int) -> Ball:
         """The input computed k samples ago, over the columns."""
+        return ball(self._waited(k))
+
+    def _waited(self, k: int) -> Matrix:
         if k:
             place = self.first + self.m * (k - 1)
-            return ball([[Fraction(int(c == place + i)) for c in range(self.columns)] for i in range(self.m)])
-        return ball([self._computed(row, self.order + i) for i, row in enumerate(self.act)])
+            return identity(self.columns)[place : place + self.m]
+        return [self._computed(row, self.order + i) for i, row in enumerate(self.act)]
 
     def _computed(self, row: list[Fraction], own: int) -> list[Fraction]:
         """What the controller makes of what it sees and of its networks, with a pulse of its own, over the columns."""
@@ -2514,14 +2578,20 @@ class Turn:
     def _phases(self) -> None:
         """(z, p) and the held input at both ends of every sub-step, over the columns."""
         claim, n, m, q = self.claim, self.n, self.m, self.q
-        parts = [(claim.share, self.held(claim.whole + 1))] if claim.share > 0 else []
-        parts.append((1 - claim.share, self.held(claim.whole)))
+        before = [(claim.share, self.held(claim.whole + 1), False)] if claim.share > 0 else []
+        parts = [*before, (1 - claim.share, self.held(claim.whole), bool(self.kicked))]
         whole = [[*row, *(self.b[i] if i < n else [Fraction(0)] * m)] for i, row in enumerate(self.flow)]
         whole += [[Fraction(0)] * (n + q + m) for _ in range(m)]
         x = Ball([[int(i == j and i < n) << FIXED for j in range(self.columns)] for i in range(n + q)], 0)
         self.steps: list[Fraction] = []
         self.ends: list[tuple[Ball, Ball, Ball]] = []
-        for share, acting in parts:
+        for share, acting, switched in parts:
+            if switched:
+                place = self.columns - self.n - self.kicked
+                kick = Ball(
+                    [[int(c == place + i and i < n) << FIXED for c in range(self.columns)] for i in range(n + q)], 0
+                )
+                x = x + kick
             pieces = max(1, round(PHASES * share))
             length = share / pieces
             forward = exponential_of([[v * length for v in row] for row in whole])
@@ -2792,7 +2862,9 @@ class Responses:
                 ends.append(index[key])
             self.pairs.append((ends[0], ends[1]))
         rows = [row for part in made for row in part.rows]
-        chosen = ball([*([Fraction(int(c == n + j)) for c in range(turn.columns)] for j in range(q)), *turn.shown])
+        self.count = len(rows)
+        networks = [[Fraction(int(c == n + j)) for c in range(turn.columns)] for j in range(q)]
+        chosen = ball([*networks, *turn.shown, *turn.turned()])
         self.rows = Ball([*rows, *chosen.rows], max(chosen.error, *(part.error for part in made)))
 
     def _groups(self) -> None:
@@ -2819,7 +2891,7 @@ class Responses:
             begun.keep(largest, scaled_up(weight, 1 / cell.growth))
             row = through(row, power, self.ends)
         last = self.lengths(row)
-        now, given = self._current(), self.rows.part(slice(None), slice(order, None)).sizes()
+        now, given = self._current(), self._given()
         (area, held), entry = grid.tail(), self.across(acting)
         unsure = [[-(-(v.numerator << FIXED) // v.denominator)] for v in turn.started()[1]]
         unknown = self.bounded(times_up(self.back.sizes(), unsure))
@@ -2834,7 +2906,11 @@ class Responses:
             settling = self._settling(self.across(start), k)
             known = larger(added(begun.sums[k], times_up(off, self.across(start))), times_up(final, settling))
             more = times_up(first, self._settling(unknown, k))
-            self.sums.append((self._between(whole, own=True), self._between(acted),
+            found = self._between(acted)
+            for row in found if turn.kicked else []:  # a kick may come before the sample that it is counted after
+                for j in range(turn.n):
+                    row[turn.width - 2 * turn.n + j] += row[turn.width - turn.n + j]
+            self.sums.append((self._between(whole, own=True), found,
                               self._between([[*x, *y] for x, y in zip(known, more, strict=True)])))  # fmt: skip
 
     def _settling(self, entry: Whole, k: int) -> Whole:
@@ -2892,6 +2968,17 @@ class Responses:
             rows, error = [*rows, *part.rows], max(error, part.error)
         return Ball(rows, error) - columns
 
+    def _given(self) -> Whole:
+        """What acts on the outputs at once; while jitter decides which input acts, z is otherwise by a kick at most."""
+        turn, n, size = self.turn, self.turn.n, self.outputs
+        found = self.rows.part(slice(None), slice(turn.order, None)).sizes()
+        place = turn.width - n - turn.kicked
+        for r in range(self.count if turn.kicked else 0):
+            if r % size < n:
+                for j, value in enumerate(turn.jitter.grown[r % size] if turn.jitter else []):
+                    found[r][place + j] += -(-(value.numerator << FIXED) // value.denominator)
+        return found
+
     def _current(self) -> Whole:
         """What acts in the period of the output, before it."""
         turn, size = self.turn, self.outputs
@@ -2908,6 +2995,12 @@ class Responses:
                 if place not in written:
                     written.add(place)
                     found[place * size : (place + 1) * size] = total
+        # what the demands move while the input before still acts
+        late = turn.claim.jitter / turn.claim.period
+        for r in range(self.count if turn.kicked else 0):
+            for j in range(turn.q if r % size >= 2 * turn.n else 0):
+                value = late * turn.direct[r % size - 2 * turn.n][j]
+                found[r][turn.n + j] += -(-(value.numerator << FIXED) // value.denominator)
         return found
 
     def _between(self, values: Whole, *, own: bool = False) -> Whole:
@@ -2924,7 +3017,7 @@ class Responses:
             square = -(-((h * h / 8).numerator << FIXED) // (h * h / 8).denominator)
             more = [[(v * square >> FIXED) + 1 for v in row] for row in curved]
             best = larger(best, added(larger(a, b), more))
-        return [*best, *values[len(values) - turn.q - len(turn.shown) :]]
+        return [*best, *values[self.count :]]
 
 
 class _Grid:
@@ -3085,26 +3178,33 @@ class Bounded:
         acted = [dot(row, self.whole) + push for row, push in zip(self.reads[:n], turn.push, strict=True)]
         moved = [dot(row[n:], turn.moving) for row in turn.sources[:n]]
         self.rates = [up(s + r + p) for s, r, p in zip(self.whole[n : 2 * n], acted, moved, strict=True)]
+        if turn.jitter:
+            changes = [v + w for v, w in zip(self.whole[-m:], turn.jitter.changed, strict=True)]
+            self.rates = [up(v + dot(row, changes)) for v, row in zip(self.rates, turn.jitter.sudden, strict=True)]
         self.inputs = [v + late for v, late in zip(self.whole[2 * n : 2 * n + m], turn.late, strict=True)]
-        self.missed = self.whole[2 * n + m :]
+        self.missed = self.whole[2 * n + m : 2 * n + m + turn.q + len(turn.shown)]
 
     def _reads(self) -> tuple[Matrix, list[Fraction]]:
         """S: |ρ| and the pulses on inputs, networks and an observer over y; and what of the pulses is known."""
         turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
-        nothing = [Fraction(0)] * (q + len(turn.shown))
+        rest = [Fraction(0)] * (len(turn.shown) + turn.turns)
+        kicks, changed = (turn.jitter.kicks, turn.jitter.changed) if turn.jitter else ([], [])
+        nothing = [Fraction(0)] * q + rest
         reads = []
         for i in range(n):
             more = 1 + turn.change[i]
             row = [more * v for v in turn.a_spread[i]]
             row += [turn.change[i] * int(i == j) for j in range(n)]
             reads.append([*row, *(more * v for v in turn.b_spread[i]), *nothing])
-        known = list(turn.blur) + [Fraction(0)] * (q + turn.w)
+        known = list(turn.blur) + [Fraction(0)] * (q + turn.w) + [dot(row, changed) for row in kicks]
         errors = [size / r for size, r in zip(turn.claim.measured, turn.claim.half_widths, strict=True)]
         for k, row in enumerate([*turn.act_spread, *turn.learn_spread]):
-            reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:], *[Fraction(0)] * len(turn.shown)])
+            reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:], *rest])
             known[k] += dot(row[:n], errors)
+        ahead = [Fraction(0)] * (len(reads[0]) - turn.turns)
         for gain in turn.blind:
-            reads.append([*[Fraction(0)] * (len(reads[0]) - 1), gain])
+            reads.append([*ahead[:-1], gain, *[Fraction(0)] * turn.turns])
+        reads += [[*ahead, *row] for row in kicks]
         return [[up(v) for v in row] for row in reads], [up(v) for v in known]
 
     def _gain(self, sums: list[Matrix]) -> Matrix:

@@ -157,6 +157,7 @@ def claim_of(
         transient=Fraction(bounds.transient),
         rest=(Fraction(bounds.rest[0]), Fraction(bounds.rest[1])),
         feedforward={name: (pair(v), pair(rate)) for name, (v, rate) in bounds.feedforward.items()},
+        jitter=Fraction(bounds.jitter),
         observer=() if bounds.observer is None else (Fraction(bounds.observer.first), Fraction(bounds.observer.second)),
         shown=[fraction(v) for v in found.box.shown],
     )

@@ -89,7 +89,7 @@ def _alone(problem: Problem, gains: GainSet) -> list[Verdict]:
 
 def _faster(member: Member) -> Member:
     """The member with a law that is nearly continuous."""
-    return member.under(replace(member.bounds, period=member.bounds.period / FASTER, delay=0.0))
+    return member.under(replace(member.bounds, period=member.bounds.period / FASTER, delay=0.0, jitter=0.0))
 
 
 def _broken(margin: Margin) -> Verdict:

@@ -165,6 +165,7 @@ def _bounds(
         transient=study.validation.transient_s,
         feedforward=feedforward,
         delay=study.controller.delay_s,
+        jitter=study.controller.jitter_s,
         rest=(float(reference(np.zeros(1))[0, 0]), study.reference.dwell_s),
         observer=observer_at(study, period),
     )

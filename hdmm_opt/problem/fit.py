@@ -81,6 +81,12 @@ def check_rates(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
             f"controller.delay_s is at most {MAX_DELAY} control periods: got {delay:g} s, {delay * fastest:.3g} "
             f"periods at {fastest:g} Hz; {MAX_DELAY / fastest:g} s would do, or a rate of {MAX_DELAY / delay:.4g} Hz"
         )
+    jitter = study.controller.jitter_s
+    if jitter > delay or 2 * jitter * fastest >= 1:
+        yield InvalidInputError(
+            f"controller.jitter_s is at most the delay, and less than half a period: got {jitter:g} s with a delay of "
+            f"{delay:g} s at {fastest:g} Hz; {min(delay, 0.45 / fastest):g} s would do"
+        )
     for name, rate in rates.items():
         if abs(round(fastest / rate) * rate / fastest - 1) > 1e-9:
             yield InvalidInputError(

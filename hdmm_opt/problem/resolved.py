@@ -27,6 +27,8 @@ def resolved(problem: Problem) -> dict[str, Any]:
     data["reference"] |= {"coordinates": "members", "waypoints": _waypoints(problem)}
     controller = data["controller"]
     controller["gains"] = {}
+    if not controller["jitter_s"]:
+        del controller["jitter_s"]
     controller["members"] = {
         name: {g.name: {"value": g.low} if g.fixed else {"min": g.low, "max": g.high} for g in member.ranges}
         for name, member in several.items()

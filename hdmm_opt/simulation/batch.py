@@ -17,6 +17,9 @@ from .scenario import SOUND, Scenario, course_at
 
 Array = NDArray[np.float64]
 
+#: Courses of jitter that runs differ by.
+PHASES = 997
+
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
@@ -102,7 +105,7 @@ class Batches:
                 [s.parameter(part.name, name, p) for name, p in plant.parameters.items()],
                 bounds * random, bounds * s.bias * (1 - s.quantisation),
                 np.where(steps > 0, steps, 2 * s.quantisation * np.array(part.noise)),
-                fault.column(len(plant.inputs)),
+                fault.column(len(plant.inputs)), [float(s.seed % PHASES)] if part.early else [],
             ]  # fmt: skip
         return np.concatenate([np.asarray(column, dtype=float) for column in columns])
 
@@ -139,7 +142,7 @@ class Batches:
                 discrete["observer"][0], seen[1] = own[0] - r[0], r[1]
             if part.waiting:
                 commands = self._first_commands(k, seen, reference, discrete["law"], gains, load)
-                discrete["pending"][:] = np.tile(commands, (part.waiting, 1))
+                discrete["pending"][:] = np.tile(commands, (part.waiting + part.early, 1))
         return x, z
 
     def _first_commands(self, k: int, x: Array, r: Array, z: Array, gains: Array, load: Sequence[float]) -> Array:

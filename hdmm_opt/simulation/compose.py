@@ -143,11 +143,27 @@ def _passed(part: Part, discrete: dict[str, Any], constants: dict[str, Any], t: 
     if not part.waiting:
         return ca.vertcat(*discrete.values())
     size, queue = len(part.law.plant.inputs), ca.vertcat(discrete["commanded"], discrete["pending"])
+    acting = queue[size * part.waiting : size * (part.waiting + 1)]
+    if part.early:
+        late = _offset(part, constants, t)
+        for k in range(-part.early, part.early + 1):
+            first = size * (part.waiting + k)
+            acting = ca.if_else(ca.fabs(late - k) < 0.5, queue[first : first + size], acting)
     moved = {
-        "applied": _delivered(queue[size * part.waiting :], constants, t, extras),
-        "pending": queue[: size * part.waiting],
+        "applied": _delivered(acting, constants, t, extras),
+        "pending": queue[: size * (part.waiting + part.early)],
     }
     return ca.vertcat(*(discrete | moved).values())
+
+
+def _offset(part: Part, constants: dict[str, Any], t: Any) -> Any:
+    """By how many ticks the input that begins to act around now is late: another number in every period."""
+    import casadi as ca
+
+    due = part.waiting * part.period / part.every
+    number = ca.floor((t - due) / part.period + 0.5)
+    mixed = 43758.5453 * ca.sin(12.9898 * number + 78.233 * constants["phase"])
+    return ca.floor((mixed - ca.floor(mixed)) * (2 * part.early + 1)) - part.early
 
 
 def _delivered(u: Any, constants: dict[str, Any], t: Any, extras: frozenset[str]) -> Any:

@@ -2,8 +2,9 @@
 
 Discrete states, member by member: those of the law, commanded input, applied input, errors, those of the observer, and
 the inputs that wait for their delay, newest first.
-Constants of a run: by member gains, parameters, spread and offset of the noisy states, quantisation steps, and the
-fault's share, start, rate and stuck input. Shared columns: each reference with three derivatives, then foreseen loads.
+Constants of a run: by member gains, parameters, spread and offset of the noisy states, quantisation steps, the
+fault's share, start, rate and stuck input, and the phase of the jitter. Shared columns: each reference with three
+derivatives, then foreseen loads.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ class Part:
         observer: What estimates its position and speed; None where they are measured.
         errors: Number of errors that its law shows.
         waiting: Ticks until a commanded input acts.
+        early: Ticks that it may act earlier or later, in every period anew.
         x, z, draws, fixed: Slices of its states, discrete states, random draws and constants.
     """
 
@@ -48,6 +50,7 @@ class Part:
     observer: Observer | None
     errors: int
     waiting: int
+    early: int
     x: slice
     z: slice
     draws: slice
@@ -71,7 +74,7 @@ class Part:
         return self.cut(z[self.z], self.discrete_sizes)
 
     def constants(self, fixed: Any) -> dict[str, Any]:
-        """Its constants by name: gains, parameters, spread, offset, grid, fault."""
+        """Its constants by name: gains, parameters, spread, offset, grid, fault, phase of the jitter."""
         return self.cut(fixed[self.fixed], self.constant_sizes)
 
     @property
@@ -79,14 +82,15 @@ class Part:
         """Sizes of its discrete states."""
         inputs = len(self.law.plant.inputs)
         return {"law": self.law.states, "commanded": inputs, "applied": inputs, "errors": self.errors,
-                "observer": 0 if self.observer is None else SIZE, "pending": inputs * self.waiting}  # fmt: skip
+                "observer": 0 if self.observer is None else SIZE,
+                "pending": inputs * (self.waiting + self.early)}  # fmt: skip
 
     @property
     def constant_sizes(self) -> dict[str, int]:
         """Sizes of its constants."""
         plant, noisy = self.law.plant, len(self.noisy)
         return {"gains": len(self.law.schema), "parameters": len(plant.parameters), "spread": noisy, "offset": noisy,
-                "grid": len(plant.states), "fault": 3 + len(plant.inputs)}  # fmt: skip
+                "grid": len(plant.states), "fault": 3 + len(plant.inputs), "phase": 1 if self.early else 0}  # fmt: skip
 
 
 def parts_of(problem: Problem, laws: Sequence[Law], period: float) -> list[Part]:
@@ -109,7 +113,8 @@ def parts_of(problem: Problem, laws: Sequence[Law], period: float) -> list[Part]
             index=k, name=member.name, law=law, every=every, period=every * period, noise=member.bounds.noise,
             resolution=member.resolution,
             observer=observer_at(problem.study, every * period), errors=errors_of(law),
-            waiting=round(member.bounds.delay / period), x=nothing, z=nothing, draws=nothing, fixed=nothing,
+            waiting=round(member.bounds.delay / period), early=round(member.bounds.jitter / period), x=nothing,
+            z=nothing, draws=nothing, fixed=nothing,
         )  # fmt: skip
         sizes = {"x": len(law.plant.states), "z": sum(part.discrete_sizes.values()), "draws": len(part.noisy),
                  "fixed": sum(part.constant_sizes.values())}  # fmt: skip

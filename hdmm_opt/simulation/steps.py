@@ -19,11 +19,12 @@ PARTS = 20
 
 
 def tick_of(problem: Problem) -> float:
-    """The shortest control period, or the part of it that divides the computing delay; or a twentieth, nearly so."""
-    period, delay = problem.period, max(member.bounds.delay for member in problem.members)
+    """The shortest control period, or the part of it that divides delay and jitter; or a twentieth, nearly so."""
+    period, bounds = problem.period, [member.bounds for member in problem.members]
+    times = max(b.delay for b in bounds), max(b.jitter for b in bounds)
     for parts in range(1, PARTS + 1):
-        ticks = delay / period * parts
-        if abs(ticks - round(ticks)) < 1e-6:
+        ticks = [time / period * parts for time in times]
+        if all(abs(count - round(count)) < 1e-6 for count in ticks):
             return period / parts
     return period / PARTS
 

@@ -24,7 +24,8 @@ class ObserverSection(Section):
 class ControllerSection(Section):
     """The law of every member, its rate and gains; `members` and `rates_hz` hold what differs from one to another.
 
-    `delay_s` is the time from a measurement until the input that is made of it acts.
+    `delay_s` is the time from a measurement until the input that is made of it acts, `jitter_s` how much earlier or
+    later it may.
     """
 
     law: Annotated[str, Field(pattern="^[a-z][a-z0-9_]*$", max_length=40)]
@@ -32,6 +33,7 @@ class ControllerSection(Section):
     rate_hz: Rate
     rates_hz: dict[Name, Rate] = Field(default_factory=dict)
     delay_s: NonNegative = 0.0
+    jitter_s: NonNegative = 0.0
     gains: dict[str, GainSection] = Field(default_factory=dict)
     members: dict[Name, dict[str, GainSection]] = Field(default_factory=dict)
     observer: ObserverSection | None = None

@@ -53,7 +53,8 @@ def budget_of(search: Search, bounds: Bounds, found: Impulse) -> Budget:
     control, cells = controller(search.model, search.gains, rows, bounds.period), []
     for part, known in zip(cells_of(rows, search.split), search.responses, strict=True):
         assert known is not None
-        reads, push = small_gain(part, known.stack, control, bounds)
+        uncertain = small_gain(part, known.stack, control, bounds)
+        reads, push = uncertain.reads, uncertain.push
         n, plain = known.stack.sizes[0], known.plain
         columns = np.hstack([
             plain.rest[:, :n] * push[:n], plain.rest[:, n:] * rows.demand_rate, plain.pulses * push[n:],
@@ -76,5 +77,6 @@ def _names(search: Search) -> list[str]:
         *(f"change of {name} until it acts" for name in model.inputs),
         *(f"rounding of the network of {states[i]}" for i in search.own),
         *(f"rounding of the observed {state}" for state in states[: 2 if observed else 0]),
+        *(f"jitter, felt by {state}" for state in (states if search.bounds.jitter > 0 else ())),
         *(f"measurement of {state}" for state in states),
     ]

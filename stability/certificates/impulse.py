@@ -98,6 +98,8 @@ def begun(
     if bounds.delay > MAX_DELAY * bounds.period:
         late = bounds.delay / bounds.period
         return Failure(reason=f"the computing delay is of {late:.3g} periods, {MAX_DELAY} is the limit")
+    if not 0 <= bounds.jitter <= min(bounds.delay, 0.499 * bounds.period):
+        return Failure(reason="the jitter of a delay is at most the delay, and less than half a period")
     try:
         return Search(model, bounds, gains, limit, cut_for(len(model.rows), fine=fine))
     except np.linalg.LinAlgError:
@@ -153,7 +155,7 @@ class Search:
         return Stack(
             a=self.force / mass[:, None], b=self.drive / mass[:, None], steering=self.steering, direct=self.direct,
             control=controller(self.model, self.gains, rows, bounds.period), period=bounds.period, whole=whole,
-            share=share, observer=bounds.observer,
+            share=share, observer=bounds.observer, jitter=bounds.jitter,
         )  # fmt: skip
 
     def run(self, bounds: Bounds) -> Impulse | Failure:
@@ -195,7 +197,7 @@ class Search:
     def _needed(self, rows: DeviationRows, solved: list[_Bound], bounds: Bounds) -> list[Array]:
         n, m, q = len(self.limit), len(self.model.inputs), len(self.own)
         whole = np.max([entry.whole for entry in solved], axis=0)
-        _, _, inputs, missed, shown = np.split(whole, np.cumsum((n, n, m, q)))
+        _, _, inputs, missed, shown, _ = np.split(whole, np.cumsum((n, n, m, q, self.box.shown.size)))
         return [whole[:n], inputs + late_of(rows, bounds), missed, shown]
 
     def _cell(
@@ -204,7 +206,8 @@ class Search:
         """The small-gain bounds of one cell."""
         stack = known.stack
         n = stack.sizes[0]
-        reads, push = small_gain(rows, stack, control, bounds)
+        uncertain = small_gain(rows, stack, control, bounds)
+        reads, push = uncertain.reads, uncertain.push
         first = self._start(rows, bounds, box)
         plain = known.plain
         forced = plain.rest[:, :n] @ push[:n] + plain.rest[:, n:] @ rows.demand_rate
@@ -215,6 +218,8 @@ class Search:
             return replace(found, row=n - 1)
         moved = stack.sources()[:n, n:] @ rows.demand_rate
         rates = found[n : 2 * n, 1] + reads[:n] @ found[:, 1] + push[:n] + moved
+        if stack.kicked:
+            rates = rates + uncertain.sudden @ (found[-stack.turned :, 1] + uncertain.changed)
         return _Bound(found[:, 0], found[:, 1], rates, reads, first, found[:, 1])
 
     def _shrinking(self, known: Responses, bound: _Bound, bounds: Bounds) -> _Bound:

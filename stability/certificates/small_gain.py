@@ -29,11 +29,13 @@ class Cut:
         width: Half the width that a part may have, as a share of its middle.
         most: Parts of one range at most.
         cells: Parts of all ranges together at most.
+        more: The same where fewer would leave a part wider than `WIDE`.
     """
 
     width: float
     most: int
     cells: int
+    more: int
 
     def of(self, rows: DeviationRows) -> tuple[int, ...]:
         """Number of parts of each range."""
@@ -41,12 +43,16 @@ class Cut:
         counts = np.clip(np.ceil(wide / self.width), 1, self.most)
         while counts.prod() > self.cells:
             after = np.where(counts > 1, wide / np.maximum(counts - 1, 1), np.inf)
+            if after.min() > WIDE and counts.prod() <= self.more:
+                break
             counts[np.argmin(after)] -= 1
         return tuple(int(v) for v in counts)
 
 
+#: Half of a part's width, as a share of its middle, that is wide for a refined certificate.
+WIDE = 0.06
 #: For candidates of a search; for a certificate that is refined, and with more rows, of which the checker takes less.
-COARSE, FINE, FEWER, MANY = Cut(0.1, 4, 4), Cut(0.008, 12, 12), Cut(0.008, 12, 8), 4
+COARSE, FINE, FEWER, MANY = Cut(0.1, 4, 4, 4), Cut(0.008, 12, 12, 24), Cut(0.008, 12, 8, 8), 4
 
 
 def cut_for(rows: int, *, fine: bool) -> Cut:
@@ -80,14 +86,28 @@ def middle_of(rows: DeviationRows) -> Array:
 
 def late_of(rows: DeviationRows, bounds: Bounds) -> Array:
     """What the modelling term of each input changes until it acts. Shape (m,)."""
-    return (bounds.period + bounds.delay) * rows.drift
+    return (bounds.period + bounds.delay + bounds.jitter) * rows.drift
 
 
-def small_gain(rows: DeviationRows, stack: Stack, ctl: Controller, bounds: Bounds) -> tuple[Array, Array]:
-    """S over y = (z, s, v, c, and what is bounded of an observer), and the known part of what acts: ρ, then pulses.
+@dataclass(frozen=True)
+class Uncertain:
+    """What is uncertain of a loop.
 
-    `ctl` is the controller in the box.
+    Attributes:
+        reads: S over y = (z, s, v, c, what is bounded of an observer, changes of inputs): ρ, then pulses.
+        push: Their known part.
+        sudden: What jitter makes of |z'| for a change of 1 of each input. Shape (n, m).
+        changed: The known part of those changes. Shape (m,).
     """
+
+    reads: Array
+    push: Array
+    sudden: Array
+    changed: Array
+
+
+def small_gain(rows: DeviationRows, stack: Stack, ctl: Controller, bounds: Bounds) -> Uncertain:
+    """What is uncertain of the loop; `ctl` is the controller in the box."""
     n, m, q = stack.sizes
     mass = middle_of(rows)
     change = np.maximum(mass / rows.mass_low - 1, 1 - mass / rows.mass_high)
@@ -95,18 +115,26 @@ def small_gain(rows: DeviationRows, stack: Stack, ctl: Controller, bounds: Bound
     spread = np.maximum(np.abs(rows.low * per - stack.a), np.abs(rows.high * per - stack.a))
     loose = np.maximum(np.abs(rows.input_low * per - stack.b), np.abs(rows.input_high * per - stack.b))
     first = 2 * n + m
-    reads = np.zeros((n + m + q + stack.watched, first + q + stack.shown))
+    reads = np.zeros((n + stack.pulses, first + q + stack.shown + stack.turned))
     reads[:n, :n], reads[:n, n : 2 * n], reads[:n, 2 * n : first] = more * spread, np.diag(change), more * loose
     reads[n : n + m, :n], reads[n : n + m, first : first + q] = ctl.feedback_spread, ctl.network_spread
     reads[n + m : n + m + q, :n], reads[n + m : n + m + q, first : first + q] = ctl.entry_spread, ctl.keep_spread
     if stack.observer is not None:
-        reads[n + m + q :, -1] = (ROUNDED.high - 1) * np.array([stack.observer.first, stack.observer.second])
+        corrected = (ROUNDED.high - 1) * np.array([stack.observer.first, stack.observer.second])
+        reads[n + m + q : n + m + q + stack.watched, first + q + stack.shown - 1] = corrected
+    kicks, sudden, changed = np.zeros((stack.kicked, m)), np.zeros((n, m)), bounds.period * rows.drift
+    if stack.kicked:  # of the input and, as long as it lasts, of what the uncertainty makes of that and of the kick
+        area, worse = stack.meanwhile()[1], change[:, None] * np.abs(stack.a) + more * spread
+        driven = more * (np.abs(stack.b) + loose)
+        kicks = np.linalg.solve(np.eye(n) - area @ worse, area @ driven)
+        sudden = np.asarray(driven + (worse + np.abs(stack.a)) @ kicks, dtype=np.float64)
+        reads[n + m + q + stack.watched :, first + q + stack.shown :] = kicks
     drift = (np.abs(stack.b) + loose) @ late_of(rows, bounds)
     push = np.concatenate([
         (1 + change) * (rows.disturbance / mass + drift), rows.noise + ctl.feedback_spread @ rows.measured,
-        ctl.entry_spread @ rows.measured, np.zeros(stack.watched),
+        ctl.entry_spread @ rows.measured, np.zeros(stack.watched), kicks @ changed,
     ])  # fmt: skip
-    return reads, push
+    return Uncertain(reads=reads, push=push, sudden=sudden, changed=changed)
 
 
 def cells_of(rows: DeviationRows, split: tuple[int, ...]) -> list[DeviationRows]:

@@ -71,6 +71,7 @@ class Claim:
     first: str = "position"
     rest: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0))
     observer: tuple[Fraction, ...] = ()
+    jitter: Fraction = Fraction(0)
     shown: list[Fraction] = field(default_factory=list)
 
     @property
@@ -101,7 +102,7 @@ class Claim:
     @property
     def pending(self) -> int:
         """Samples whose inputs are still to act."""
-        return self.whole + (self.share > 0)
+        return self.whole + (self.share > 0 or self.jitter > 0)
 
 
 def cell_of(entry: dict[str, Any]) -> Cell:

@@ -87,7 +87,7 @@ STUDY = entry_of(
             {"law": text, "modelling": listed(some(*MODELLING), 0, 8), "rate_hz": plain_number,
              "rates_hz": named(plain_number), "delay_s": share,
              "gains": NOTHING, "members": named(named(RANGE))},
-            {"observer": entry_of({}, {"bandwidth_rad_s": plain_number})},
+            {"observer": entry_of({}, {"bandwidth_rad_s": plain_number}), "jitter_s": positive},
         ),
         "requirements": entry_of(
             {"tracking_error_m": plain_number, "member_error": named(plain_number)},

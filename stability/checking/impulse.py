@@ -43,26 +43,33 @@ class Bounded:
         acted = [dot(row, self.whole) + push for row, push in zip(self.reads[:n], turn.push, strict=True)]
         moved = [dot(row[n:], turn.moving) for row in turn.sources[:n]]
         self.rates = [up(s + r + p) for s, r, p in zip(self.whole[n : 2 * n], acted, moved, strict=True)]
+        if turn.jitter:
+            changes = [v + w for v, w in zip(self.whole[-m:], turn.jitter.changed, strict=True)]
+            self.rates = [up(v + dot(row, changes)) for v, row in zip(self.rates, turn.jitter.sudden, strict=True)]
         self.inputs = [v + late for v, late in zip(self.whole[2 * n : 2 * n + m], turn.late, strict=True)]
-        self.missed = self.whole[2 * n + m :]
+        self.missed = self.whole[2 * n + m : 2 * n + m + turn.q + len(turn.shown)]
 
     def _reads(self) -> tuple[Matrix, list[Fraction]]:
         """S: |ρ| and the pulses on inputs, networks and an observer over y; and what of the pulses is known."""
         turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
-        nothing = [Fraction(0)] * (q + len(turn.shown))
+        rest = [Fraction(0)] * (len(turn.shown) + turn.turns)
+        kicks, changed = (turn.jitter.kicks, turn.jitter.changed) if turn.jitter else ([], [])
+        nothing = [Fraction(0)] * q + rest
         reads = []
         for i in range(n):
             more = 1 + turn.change[i]
             row = [more * v for v in turn.a_spread[i]]
             row += [turn.change[i] * int(i == j) for j in range(n)]
             reads.append([*row, *(more * v for v in turn.b_spread[i]), *nothing])
-        known = list(turn.blur) + [Fraction(0)] * (q + turn.w)
+        known = list(turn.blur) + [Fraction(0)] * (q + turn.w) + [dot(row, changed) for row in kicks]
         errors = [size / r for size, r in zip(turn.claim.measured, turn.claim.half_widths, strict=True)]
         for k, row in enumerate([*turn.act_spread, *turn.learn_spread]):
-            reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:], *[Fraction(0)] * len(turn.shown)])
+            reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:], *rest])
             known[k] += dot(row[:n], errors)
+        ahead = [Fraction(0)] * (len(reads[0]) - turn.turns)
         for gain in turn.blind:
-            reads.append([*[Fraction(0)] * (len(reads[0]) - 1), gain])
+            reads.append([*ahead[:-1], gain, *[Fraction(0)] * turn.turns])
+        reads += [[*ahead, *row] for row in kicks]
         return [[up(v) for v in row] for row in reads], [up(v) for v in known]
 
     def _gain(self, sums: list[Matrix]) -> Matrix:

@@ -214,8 +214,11 @@ class Loop:
 
     def late(self, k: int) -> Fraction:
         """What the modelling term of input k changes until it acts."""
-        change = magnitude(self.table.over(self.virtual[self.claim.input_map[k]]))
-        return (self.claim.period + self.claim.delay) * change
+        return (self.claim.period + self.claim.delay + self.claim.jitter) * self.drift(k)
+
+    def drift(self, k: int) -> Fraction:
+        """Bound on the rate of the modelling term of input k."""
+        return magnitude(self.table.over(self.virtual[self.claim.input_map[k]]))
 
     def size(self, name: str, deviations: list[Fraction], *, resting: bool) -> Fraction:
         """Bound on |input| as commanded, or on |state|, for bounds on |z| and |v|, in motion or at rest at first."""

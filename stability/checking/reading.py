@@ -57,6 +57,8 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     need([given["row"] for given in networks] == own, "the networks are not those of the gains")
     delay = number(controller["delay_s"], "delay_s")
     need(delay * rate <= MAX_DELAY, f"a computing delay is of at most {MAX_DELAY} periods")
+    jitter = number(controller.get("jitter_s", Fraction(0)), "jitter_s")
+    need(0 <= jitter <= delay and 2 * jitter * rate < 1, "jitter is at most the delay, and less than half a period")
     need(not watched or gains[0][4] == 0, "a row with an observer has no load network")
     need(
         ("observed" in certificate) == bool(watched), "what an observer shows is bounded where there is one, only there"
@@ -81,7 +83,7 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
         transient=transient,
         feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
         first=model["first"], rest=rest_of(entry["reference"]["segments"], study["reference"]["dwell_s"]),
-        observer=watched, shown=numbers(certificate["observed"], 3, "observed") if watched else [],
+        jitter=jitter, observer=watched, shown=numbers(certificate["observed"], 3, "observed") if watched else [],
     )  # fmt: skip
 
 

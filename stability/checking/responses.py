@@ -102,7 +102,9 @@ class Responses:
                 ends.append(index[key])
             self.pairs.append((ends[0], ends[1]))
         rows = [row for part in made for row in part.rows]
-        chosen = ball([*([Fraction(int(c == n + j)) for c in range(turn.columns)] for j in range(q)), *turn.shown])
+        self.count = len(rows)
+        networks = [[Fraction(int(c == n + j)) for c in range(turn.columns)] for j in range(q)]
+        chosen = ball([*networks, *turn.shown, *turn.turned()])
         self.rows = Ball([*rows, *chosen.rows], max(chosen.error, *(part.error for part in made)))
 
     def _groups(self) -> None:
@@ -129,7 +131,7 @@ class Responses:
             begun.keep(largest, scaled_up(weight, 1 / cell.growth))
             row = through(row, power, self.ends)
         last = self.lengths(row)
-        now, given = self._current(), self.rows.part(slice(None), slice(order, None)).sizes()
+        now, given = self._current(), self._given()
         (area, held), entry = grid.tail(), self.across(acting)
         unsure = [[-(-(v.numerator << FIXED) // v.denominator)] for v in turn.started()[1]]
         unknown = self.bounded(times_up(self.back.sizes(), unsure))
@@ -144,7 +146,11 @@ class Responses:
             settling = self._settling(self.across(start), k)
             known = larger(added(begun.sums[k], times_up(off, self.across(start))), times_up(final, settling))
             more = times_up(first, self._settling(unknown, k))
-            self.sums.append((self._between(whole, own=True), self._between(acted),
+            found = self._between(acted)
+            for row in found if turn.kicked else []:  # a kick may come before the sample that it is counted after
+                for j in range(turn.n):
+                    row[turn.width - 2 * turn.n + j] += row[turn.width - turn.n + j]
+            self.sums.append((self._between(whole, own=True), found,
                               self._between([[*x, *y] for x, y in zip(known, more, strict=True)])))  # fmt: skip
 
     def _settling(self, entry: Whole, k: int) -> Whole:
@@ -202,6 +208,17 @@ class Responses:
             rows, error = [*rows, *part.rows], max(error, part.error)
         return Ball(rows, error) - columns
 
+    def _given(self) -> Whole:
+        """What acts on the outputs at once; while jitter decides which input acts, z is otherwise by a kick at most."""
+        turn, n, size = self.turn, self.turn.n, self.outputs
+        found = self.rows.part(slice(None), slice(turn.order, None)).sizes()
+        place = turn.width - n - turn.kicked
+        for r in range(self.count if turn.kicked else 0):
+            if r % size < n:
+                for j, value in enumerate(turn.jitter.grown[r % size] if turn.jitter else []):
+                    found[r][place + j] += -(-(value.numerator << FIXED) // value.denominator)
+        return found
+
     def _current(self) -> Whole:
         """What acts in the period of the output, before it."""
         turn, size = self.turn, self.outputs
@@ -218,6 +235,12 @@ class Responses:
                 if place not in written:
                     written.add(place)
                     found[place * size : (place + 1) * size] = total
+        # what the demands move while the input before still acts
+        late = turn.claim.jitter / turn.claim.period
+        for r in range(self.count if turn.kicked else 0):
+            for j in range(turn.q if r % size >= 2 * turn.n else 0):
+                value = late * turn.direct[r % size - 2 * turn.n][j]
+                found[r][turn.n + j] += -(-(value.numerator << FIXED) // value.denominator)
         return found
 
     def _between(self, values: Whole, *, own: bool = False) -> Whole:
@@ -234,7 +257,7 @@ class Responses:
             square = -(-((h * h / 8).numerator << FIXED) // (h * h / 8).denominator)
             more = [[(v * square >> FIXED) + 1 for v in row] for row in curved]
             best = larger(best, added(larger(a, b), more))
-        return [*best, *values[len(values) - turn.q - len(turn.shown) :]]
+        return [*best, *values[self.count :]]
 
 
 class _Grid:

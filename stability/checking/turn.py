@@ -9,6 +9,7 @@ from fractions import Fraction
 
 from .arithmetic import ZERO, Interval, add, down, mul, neg, up
 from .claim import Claim
+from .jitter import Jitter
 from .limits import FIXED, ROUNDING
 from .loop import Loop
 from .matrices import Ball, Matrix, ball, dot, exponential_of, identity
@@ -29,8 +30,8 @@ class Turn:
 
     Everything is in units of the box: z_i of half_widths_i, v_k of input_bound_k, φ̂ - φ* of network_bound_q, time of
     the period. Z holds z, φ̂ - φ*, the states of an observer, and the pending inputs, newest first; columns of maps are
-    over Z, then pulses on the new inputs, on the networks and on what the observer sees, and measurement errors of the
-    states.
+    over Z, then pulses on the new inputs, on the networks and on what the observer sees, kicks of jitter to the states,
+    and measurement errors of the states.
     """
 
     def __init__(self, claim: Claim, loop: Loop, masses: list[Interval]) -> None:
@@ -39,11 +40,13 @@ class Turn:
         self.w = 2 if claim.observer else 0
         self.first = self.n + self.q + self.w
         self.order = self.first + self.m * claim.pending
-        self.width = self.m + self.q + self.w + self.n
+        self.kicked, self.turns = (self.n, self.m) if claim.jitter > 0 else (0, 0)
+        self.width = self.m + self.q + self.w + self.kicked + self.n
         self.columns = self.order + self.width
         self._plant(masses)
         self._controller()
         self._observer()
+        self.jitter = Jitter(self) if claim.jitter > 0 else None
         self._flow()
         self._phases()
         self._sample()
@@ -127,7 +130,11 @@ class Turn:
         if not claim.observer:
             return
         per = claim.half_widths[0] / claim.half_widths[1]
-        gains, place, pulse = (claim.observer[0], claim.observer[1] * per), self.n + self.q, noise - self.w
+        gains, place, pulse = (
+            (claim.observer[0], claim.observer[1] * per),
+            self.n + self.q,
+            noise - self.kicked - self.w,
+        )
         missed = [v - w for v, w in zip(self.seen[0], unit[place], strict=True)]
         for i, gain in enumerate(gains):
             self.seen[i] = _sum(unit[place + i], [gain * v for v in missed], unit[pulse + i])
@@ -154,12 +161,22 @@ class Turn:
                 if claim.rows[i]["target"] == row:
                     self.sources[i][n + j] = bounds[j] / claim.half_widths[i]
 
+    def turned(self) -> Matrix:
+        """How much the inputs change that act in a period, over the columns; only with jitter."""
+        if not self.kicked:
+            return []
+        old, new = self._waited(self.claim.whole + 1), self._waited(self.claim.whole)
+        return [[v - w for v, w in zip(*rows, strict=True)] for rows in zip(new, old, strict=True)]
+
     def held(self, k: int) -> Ball:
         """The input computed k samples ago, over the columns."""
+        return ball(self._waited(k))
+
+    def _waited(self, k: int) -> Matrix:
         if k:
             place = self.first + self.m * (k - 1)
-            return ball([[Fraction(int(c == place + i)) for c in range(self.columns)] for i in range(self.m)])
-        return ball([self._computed(row, self.order + i) for i, row in enumerate(self.act)])
+            return identity(self.columns)[place : place + self.m]
+        return [self._computed(row, self.order + i) for i, row in enumerate(self.act)]
 
     def _computed(self, row: list[Fraction], own: int) -> list[Fraction]:
         """What the controller makes of what it sees and of its networks, with a pulse of its own, over the columns."""
@@ -172,14 +189,20 @@ class Turn:
     def _phases(self) -> None:
         """(z, p) and the held input at both ends of every sub-step, over the columns."""
         claim, n, m, q = self.claim, self.n, self.m, self.q
-        parts = [(claim.share, self.held(claim.whole + 1))] if claim.share > 0 else []
-        parts.append((1 - claim.share, self.held(claim.whole)))
+        before = [(claim.share, self.held(claim.whole + 1), False)] if claim.share > 0 else []
+        parts = [*before, (1 - claim.share, self.held(claim.whole), bool(self.kicked))]
         whole = [[*row, *(self.b[i] if i < n else [Fraction(0)] * m)] for i, row in enumerate(self.flow)]
         whole += [[Fraction(0)] * (n + q + m) for _ in range(m)]
         x = Ball([[int(i == j and i < n) << FIXED for j in range(self.columns)] for i in range(n + q)], 0)
         self.steps: list[Fraction] = []
         self.ends: list[tuple[Ball, Ball, Ball]] = []
-        for share, acting in parts:
+        for share, acting, switched in parts:
+            if switched:
+                place = self.columns - self.n - self.kicked
+                kick = Ball(
+                    [[int(c == place + i and i < n) << FIXED for c in range(self.columns)] for i in range(n + q)], 0
+                )
+                x = x + kick
             pieces = max(1, round(PHASES * share))
             length = share / pieces
             forward = exponential_of([[v * length for v in row] for row in whole])

@@ -104,6 +104,7 @@ class Bounds:
             the real one may differ from that, of any course. The law foresees them as they move, ``nominal.NAME``,
             unless `nominal` has the name.
         delay: Computing delay in s: what is measured at t_k acts from t_k + delay on.
+        jitter: How much earlier or later it may act, s; at most the delay, and less than half a period.
         rest: Where the reference rests at first, and for how long, s.
         observer: What makes the first two states of the first one's measurement; None where all are measured.
     """
@@ -118,5 +119,6 @@ class Bounds:
     transient: float = 0.0
     feedforward: Mapping[str, tuple[Interval, Interval]] = field(default_factory=dict)
     delay: float = 0.0
+    jitter: float = 0.0
     rest: tuple[float, float] = (0.0, 0.0)
     observer: Observer | None = None

@@ -138,8 +138,8 @@ class _Sum:
             np.eye(n, n + q), np.hstack([stack.a, stack.b @ stack.direct]), np.hstack([np.zeros((m, n)), stack.direct]),
         ])  # fmt: skip
         through = np.vstack([np.zeros((n, m)), stack.b, np.eye(m)])
-        early = [self.cx @ x + through @ v for x, v in zip(one.begin[:-1], one.held, strict=True)]
-        late = [self.cx @ x + through @ v for x, v in zip(one.begin[1:], one.held, strict=True)]
+        early = [self.cx @ x + through @ v for x, v in zip(one.begin, one.held, strict=True)]
+        late = [self.cx @ x + through @ v for x, v in zip(one.end, one.held, strict=True)]
         self.rows = np.vstack([*early, *late, one.shown])
         inside = basis.inverse @ one.image[:, :order] @ basis.columns
         self.block = diagonal(inside, basis.blocks)
@@ -161,15 +161,15 @@ class _Sum:
 
     def made(self, groups: tuple[int, ...]) -> tuple[Responses, float]:
         """The sums, and the largest share of those to the first output by which what is left may be overestimated."""
-        n, m, q = self.stack.sizes
-        pulses, order, growths = m + q + self.stack.watched, self.stack.order, [1.0, *self.growths]
+        n, _, q = self.stack.sizes
+        pulses, order, growths = self.stack.pulses, self.stack.order, [1.0, *self.growths]
         past, totals, after = self._past(groups)
         done, counts = np.cumsum((0, *groups)), np.array(groups)[:, None, None]
         # what acts in period P meets period P + k + 1 with weight growth^(k + 1); a group has the weight of its end
         weights = np.array(growths)[:, None] ** done[1:]
         rest = self._integrals(counts, past, totals, weights)
         felt, begun = self._discrete(counts, past, totals, weights, pulses + n)
-        now, fixed = self._current(), np.abs(self.rows[:, order:])
+        now, fixed = self._current(), np.abs(self.rows[:, order:]) + self._meanwhile()
         last = self.basis.of_rows(after)
         tails = [self._left(last, growth, growth ** float(done[-1])) for growth in growths]
         values = np.array([
@@ -181,6 +181,8 @@ class _Sum:
         ])  # fmt: skip
         ends = np.cumsum((n + q, pulses, n))
         sums = [Sums(*np.split(part, ends, axis=1)) for part in self._between(values)]
+        for part in sums if self.stack.kicked else []:  # a kick may come before the sample that it is counted after
+            part.pulses[:, pulses - n :] += part.noise
         made = Responses(
             stack=self.stack, basis=self.basis, groups=groups, plain=sums[0],
             weighted=dict(zip(self.growths, sums[1:], strict=True)),
@@ -226,6 +228,15 @@ class _Sum:
         first = np.array([(largest * (weight / weight[0])[:, None, None]).max(axis=0) for weight in weights])
         return np.tensordot(weights, summed, 1), first
 
+    def _meanwhile(self) -> Array:
+        """What z is otherwise while jitter decides which input acts: by a kick at most."""
+        stack, n, size = self.stack, self.stack.sizes[0], self.outputs
+        found = np.zeros((len(self.rows), stack.pulses + n))
+        if stack.kicked:
+            for first in range(0, 2 * len(self.one.steps) * size, size):
+                found[first : first + n, stack.pulses - n : stack.pulses] = stack.meanwhile()[0]
+        return found
+
     def _current(self) -> Array:
         """What acts in the period of the output, before it."""
         steps, size = self.one.steps, self.outputs
@@ -239,6 +250,9 @@ class _Sum:
                 if j + 1 < count:
                     found[(j + 1) * size : (j + 2) * size] += piece
                 rows = rows @ parts[i].forward
+        # what the demands move while the input before still acts
+        for first in range(2 * self.stack.sizes[0], 2 * count * size, size):
+            found[first : first + self.stack.sizes[1], self.stack.sizes[0] :] += self.stack.jitter * self.stack.direct
         return found
 
     def _left(self, last: Array, growth: float, weight: float) -> tuple[Array, Array, Array]:

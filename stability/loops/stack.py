@@ -6,6 +6,7 @@ inside a period, where p is what a demand moves since the last sample; z_i' gets
 a network. At a sample v_new = -K ẑ - C c, c <- A c + G ẑ - p, the pending inputs move on by one and by p. ẑ is z as it
 is measured, or for the first two states what an observer with the states w makes of the first. With a delay
 of so many whole periods and a share, the input switches from one pending value to the next at that share of a period.
+With jitter it may switch earlier or later: that is a kick to z at this instant, as large as what acts meanwhile makes.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from .box import DeviationRows
 from .deviation import ROUNDED, networks
 from .model import Gains, LoopModel
 from .observer import SHOWN, STATES, Observer
+from .substep import integrals_of
 
 Array = NDArray[np.float64]
 
@@ -144,6 +146,7 @@ class Stack:
         whole: Whole periods of delay.
         share: The rest of the delay as a share of the period, 0 or more and below 1.
         observer: What makes ẑ_1 and ẑ_2 of z_1; None where all are measured.
+        jitter: How much earlier or later than that an input may begin to act, s.
     """
 
     a: Array
@@ -155,6 +158,7 @@ class Stack:
     whole: int
     share: float
     observer: Observer | None = None
+    jitter: float = 0.0
 
     @property
     def watched(self) -> int:
@@ -167,9 +171,30 @@ class Stack:
         return SHOWN if self.observer is not None else 0
 
     @property
+    def kicked(self) -> int:
+        """Number of states that jitter kicks."""
+        return self.a.shape[0] if self.jitter > 0 else 0
+
+    @property
+    def turned(self) -> int:
+        """Number of outputs that say by how much an input changes from a sample to the next."""
+        return self.b.shape[1] if self.jitter > 0 else 0
+
+    @property
+    def pulses(self) -> int:
+        """Number of what acts at samples beside measurement errors: on inputs, networks, ẑ of an observer; kicks."""
+        _, m, q = self.sizes
+        return m + q + self.watched + self.kicked
+
+    def meanwhile(self) -> tuple[Array, Array]:
+        """Entrywise bounds on |e^{a s}| and on its integral over 0 <= s <= jitter. Shapes (n, n)."""
+        grown, area, _ = integrals_of(np.abs(self.a), self.jitter)
+        return grown, area
+
+    @property
     def pending(self) -> int:
         """Number of samples whose inputs are still to act."""
-        return self.whole + (self.share > 0)
+        return self.whole + (self.share > 0 or self.jitter > 0)
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -248,20 +273,23 @@ def wiring(model: LoopModel, own: Sequence[int]) -> tuple[Array, Array]:
 class Turn:
     """A period of a stack on a grid of sub-steps that holds the switch of the input.
 
-    Columns are over Z, then pulses on the new inputs, on the networks and on ẑ of an observer, and measurement errors
-    of the states.
+    Columns are over Z, then pulses on the new inputs, on the networks and on ẑ of an observer, kicks of jitter, and
+    measurement errors of the states.
 
     Attributes:
         steps: Length of each sub-step, s.
-        begin: (z, p) at the start of each sub-step, and at the end of the last. Shape (steps + 1, n + q, columns).
+        begin: (z, p) at the start of each sub-step. Shape (steps, n + q, columns).
+        end: The same at the end of each.
         held: The input that acts in each sub-step. Shape (steps, m, columns).
         image: Z at the next sample. Shape (order, columns).
         fold: How (z, p) at the end of a period enters Z. Shape (order, n + q).
-        shown: c, and what is bounded of an observer, at a sample. Shape (q + 3 or q, columns).
+        shown: c and what is bounded of an observer, at a sample; how much the input changes that acts in this period.
+            Shape (q + 3 or q, and m with jitter, columns).
     """
 
     steps: Array
     begin: Array
+    end: Array
     held: Array
     image: Array
     fold: Array
@@ -274,9 +302,9 @@ def turn(stack: Stack, count: int) -> Turn:
 
     n, m, q = stack.sizes
     order, waiting, watched, ctl = stack.order, stack.pending, stack.watched, stack.control
-    columns, first = order + m + q + watched + n, n + q + watched
+    columns, first = order + stack.pulses + n, n + q + watched
     unit = np.eye(columns)
-    pulse, learn, astray, noise = np.split(unit[order:], np.cumsum((m, q, watched)))
+    pulse, learn, astray, kick, noise = np.split(unit[order:], np.cumsum((m, q, watched, stack.kicked)))
     of_states, of_observer = stack.seen()
     seen = of_states @ (unit[:n] + noise) + of_observer @ unit[n + q : first]
     seen[:watched] += astray
@@ -289,22 +317,25 @@ def turn(stack: Stack, count: int) -> Turn:
             return fresh
         return unit[first + m * (k - 1) : first + m * k]
 
-    parts = [(stack.share, waited(stack.whole + 1))] if stack.share > 0 else []
-    parts.append((1 - stack.share, waited(stack.whole)))
+    before = [(stack.share, waited(stack.whole + 1), False)] if stack.share > 0 else []
+    parts = [*before, (1 - stack.share, waited(stack.whole), bool(stack.kicked))]
     flow = stack.flow()
     block = np.zeros((n + q + m, n + q + m))
     block[: n + q, : n + q], block[:n, n + q :] = flow, stack.b
     x = np.eye(n + q, columns)
     x[n:] = 0.0
-    steps, begin, acting = [], [x], []
-    for share, held in parts:
+    steps, begin, end, acting = [], [], [], []
+    for share, held, switched in parts:
+        if switched:
+            x = np.vstack([x[:n] + kick, x[n:]])
         pieces = max(1, round(count * share))
         length = share * stack.period / pieces
         forward = np.asarray(expm(block * length))
         for _ in range(pieces):
+            begin.append(x)
             x = forward[: n + q, : n + q] @ x + forward[: n + q, n + q :] @ held
             steps.append(length)
-            begin.append(x)
+            end.append(x)
             acting.append(held)
     fold = np.zeros((order, n + q))
     fold[:n, :n] = np.eye(n)
@@ -316,9 +347,15 @@ def turn(stack: Stack, count: int) -> Turn:
     image[n + q : first] += stack.ahead[:watched] @ seen[:2] if watched else 0.0
     for k in range(waiting):
         image[first + m * k : first + m * (k + 1)] += waited(k)
-    shown = networks
-    if watched:
-        shown = np.vstack([networks, (seen - unit[:n])[:2], unit[0] + noise[0] - unit[n + q]])
+    of_observer = [(seen - unit[:n])[:2], (unit[0] + noise[0] - unit[n + q])[None]] if watched else []
+    changes = waited(stack.whole) - waited(stack.whole + 1) if stack.turned else unit[:0]
+    shown = np.vstack([networks, *of_observer, changes])
     return Turn(
-        steps=np.array(steps), begin=np.array(begin), held=np.array(acting), image=image, fold=fold, shown=shown
-    )
+        steps=np.array(steps),
+        begin=np.array(begin),
+        end=np.array(end),
+        held=np.array(acting),
+        image=image,
+        fold=fold,
+        shown=shown,
+    )  # fmt: skip

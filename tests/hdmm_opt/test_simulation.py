@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -28,7 +29,7 @@ GAINS = {"actuator": VALUES}
 MOVE = Reference(segments=(constant(0.1, 0, 0.2), quintic(0.1, 0.2, 0.2, 2.5), constant(0.2, 2.7, 3)))
 
 
-def loop(period=1e-3, noise=(0.0, 0.0, 0.0), delay=0.0, observer=None, resolution=0.0, **more):
+def loop(period=1e-3, noise=(0.0, 0.0, 0.0), delay=0.0, observer=None, resolution=0.0, jitter=0.0, **more):
     """The EMLA at torque level with its bundled numbers along one move; the nominal load is 70 kN."""
     data = emla("emla-p2")
     data["plant"]["parameters"] = {}
@@ -38,7 +39,7 @@ def loop(period=1e-3, noise=(0.0, 0.0, 0.0), delay=0.0, observer=None, resolutio
         "initial": {"position": 1e-3},
     }
     data["uncertainty"]["resolution"] = {"position": resolution}
-    data["controller"] |= {"rate_hz": 1 / period, "delay_s": delay, "observer": observer}
+    data["controller"] |= {"rate_hz": 1 / period, "delay_s": delay, "observer": observer, "jitter_s": jitter}
     data["validation"]["transient_s"], data["requirements"]["tracking_error_m"] = 0.5, 1e-3
     data["requirements"].pop("settling_band_m")
     data["validation"]["scenarios"] = [{"name": "plain"}]
@@ -50,14 +51,22 @@ def under(load, **more):
     return Scenario(name="x", disturbances={"load_force": load if isinstance(load, tuple) else ((0.0, load),)}, **more)
 
 
+def late(number, ticks):
+    """By how many ticks the input of a sample acts late: the mixed digits of its number, for the run of seed 0."""
+    mixed = 43758.5453 * np.sin(12.9898 * number)
+    return np.floor((mixed - np.floor(mixed)) * (2 * ticks + 1)) - ticks
+
+
 @pytest.mark.parametrize(
-    ("values", "delay", "observer", "resolution"),
+    ("values", "delay", "observer", "resolution", "jitter"),
     [
-        (VALUES, 0.0, None, 0.0), (LEARNING, 0.0, None, 0.0), (LEARNING, 1e-3, None, 0.0), (LEARNING, 1.25e-3, None, 0.0),
-        (LEARNING, 1e-3, {}, 0.0), (LEARNING, 0.0, {"bandwidth_rad_s": 400.0}, 0.0), (LEARNING, 1e-3, {}, 1e-5),
+        (VALUES, 0.0, None, 0.0, 0.0), (LEARNING, 0.0, None, 0.0, 0.0), (LEARNING, 1e-3, None, 0.0, 0.0),
+        (LEARNING, 1.25e-3, None, 0.0, 0.0), (LEARNING, 1e-3, {}, 0.0, 0.0), (LEARNING, 1e-3, {}, 1e-5, 0.0),
+        (LEARNING, 0.0, {"bandwidth_rad_s": 400.0}, 0.0, 0.0), (LEARNING, 1e-3, {}, 0.0, 1e-4),
+        (LEARNING, 0.5e-3, None, 0.0, 2e-4),
     ],
 )  # fmt: skip
-def test_agrees_with_an_independent_adaptive_integrator(values, delay, observer, resolution):
+def test_agrees_with_an_independent_adaptive_integrator(values, delay, observer, resolution, jitter):
     """The same sampled loop, law written by hand, plant written by hand, integrated by SciPy at 1e-10."""
     q = pmsm_emla("torque").values()
     r, load = transmission(q), 70e3
@@ -70,9 +79,9 @@ def test_agrees_with_an_independent_adaptive_integrator(values, delay, observer,
         driving = q["torque_scale"] * x[2] - q["viscous_friction"] * x[1] / r - r * (1 + loss) * force
         return [x[1], driving / (mass * (1 + loss * r * q["load_mass"] / mass)), (u - x[2]) / q["drive_lag"]]
 
-    made = loop(delay=delay, observer=observer, resolution=resolution)
+    made = loop(delay=delay, observer=observer, resolution=resolution, jitter=jitter)
     trace = made.trace({"actuator": values}, under(load), duration=1.5).members["actuator"]
-    x, theta, phi, states, queue = trace.x[:, 0], np.zeros(2), [values[6], values[13]], [], []
+    x, theta, phi, states, commands = trace.x[:, 0], np.zeros(2), [values[6], values[13]], [], []
     pole = np.exp(-1e-3 * observer["bandwidth_rad_s"]) if observer else 0.0
     before, speed_error = None, 0.0
     limits = {"rtol": 1e-10, "atol": 1e-12, "method": "DOP853"}
@@ -93,12 +102,13 @@ def test_agrees_with_an_independent_adaptive_integrator(values, delay, observer,
         for i, (epsilon, delta, sigma, e) in enumerate(((e1, d1, s1, q1), (e2, d2, s2, q2))):
             theta[i] += 1e-3 * (-delta * sigma * theta[i] + 0.5 * epsilon * delta * e * e)
         phi[1] += 1e-3 * gamma * q2
-        # what was computed at t_k acts from t_k + delay on, the first of all from the beginning
-        queue = [u] * 3 if k == 0 else [u, *queue[:2]]
-        whole, share = int(delay / 1e-3 + 1e-9), (delay / 1e-3) % 1
-        for part, held in ((share, queue[min(whole + 1, 2)]), (1 - share, queue[whole])):
-            if part > 1e-9:
-                x = solve_ivp(plant, (0, part * 1e-3), x, args=(held,), **limits).y[:, -1]
+        # what was computed at t_j acts from t_j + delay on, earlier or later; the first of all from the beginning
+        commands.append(u)
+        begins = [1e-3 * j + delay + late(j, round(jitter / made.period)) * made.period for j in range(k + 3)]
+        times = [1e-3 * k, *(b for b in begins if 1e-3 * k + 1e-9 < b < 1e-3 * (k + 1) - 1e-9), 1e-3 * (k + 1)]
+        for begin, end in pairwise(times):
+            acting = max((j for j, b in enumerate(begins) if b < begin + 1e-9), default=0)
+            x = solve_ivp(plant, (0, end - begin), x, args=(commands[acting],), **limits).y[:, -1]
     every = round(1e-3 / made.period)
     steps = 1.0 if resolution else 0.0  # where rounding turns on the last digit, the runs part by a step for a while
     assert np.abs(trace.x[0, ::every] - np.array(states)[:, 0]).max() < 1e-8 + steps * resolution

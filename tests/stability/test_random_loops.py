@@ -101,6 +101,13 @@ def watched_case(seed: int) -> Case:
     return replace(case, bounds=bounds)
 
 
+def shaken_case(seed: int) -> Case:
+    """Inputs that act up to a step of the attack earlier or later; half of them with an encoder alone."""
+    case = watched_case(seed) if seed % 2 else random_case(seed)
+    step = case.bounds.period / FRACTIONS
+    return replace(case, bounds=replace(case.bounds, delay=max(case.bounds.delay, step), jitter=step))
+
+
 def model_of(case: Case) -> LoopModel:
     n = case.order
     names = (*(f"x{i}" for i in range(n)), "u", "w", "e", *case.bounds.parameters)
@@ -124,6 +131,7 @@ class Attack:
 
     def __init__(self, case: Case, corner: np.ndarray) -> None:
         n, bounds = case.order, case.bounds
+        self.early = 0
         self.case, self.waiting = case, int(np.ceil(bounds.delay / bounds.period - 1e-9))
         ends = [case.mass, case.drive, *case.lags]
         mass, drive, *lags = (a + (b - a) * c for (a, b), c in zip(ends, corner, strict=True))
@@ -190,10 +198,12 @@ class Attack:
     def worst(self, final: int, start: np.ndarray, random: np.random.Generator) -> np.ndarray:
         """|x_1| at every step of a run whose inputs are in step with the response of x_1 at step `final`."""
         bounds = self.case.bounds
-        back, signs = np.zeros(self.size), []
+        back, signs, reach = np.zeros(self.size), [], []
         back[0] = random.choice((-1.0, 1.0))
         for k in range(final - 1, -1, -1):
             push = np.sign(back @ self.push)
+            # what a unit of input makes of the end if it acts in this step alone
+            reach.append(back[: self.acting] @ self.step[: self.acting, self.acting])
             back = back @ self.step
             noise = np.zeros(self.case.order)
             if k % FRACTIONS == self.switch_at and self.switch_at:
@@ -203,14 +213,18 @@ class Attack:
                 back = back @ self.sample
             signs.append((push, noise))
         signs.reverse()
+        reach.reverse()
         load = bounds.feedforward["w"][0] if self.case.rate else bounds.disturbances["w"]
         h, state = bounds.period / FRACTIONS, start.copy()
-        seen = [abs(state[0])]
+        seen, commands = [abs(state[0])], [state[self.acting]]
         for k, (push, noise) in enumerate(signs):
             if k % FRACTIONS == 0:
                 state = self.sample @ state + self.heard @ (noise * bounds.noise)
+                commands.append(state[self.phi + 1])
             if k % FRACTIONS == self.switch_at and self.switch_at:
                 state = self.switch @ state
+            if bounds.jitter:
+                state[self.acting] = commands[self._acts(k, commands, reach)]
             rate = 0.0
             if self.case.rate:
                 goal = np.clip(state[self.w] + push[1] * self.case.rate * h, load.low, load.high)
@@ -220,6 +234,20 @@ class Attack:
             state = self.step @ state + self.push @ np.array([push[0] * bounds.disturbances["e"].high, rate])
             seen.append(abs(state[0]))
         return np.array(seen)
+
+    def _acts(self, k: int, commands: list[float], reach: list[float]) -> int:
+        """Which command acts in a step: near the switch the one that does more harm, but none twice."""
+        late = round(self.case.bounds.delay / self.case.bounds.period * FRACTIONS)
+        newest = max(0, (k - late) // FRACTIONS + 1)
+        if (k - late) % FRACTIONS == 0 and newest:  # it should act from here on: later where that does harm
+            before = self.early == newest
+            later = not before and (commands[newest - 1] - commands[newest]) * reach[k] > 0
+            return newest - later
+        if (k + 1 - late) % FRACTIONS == 0 and newest + 1 < len(commands):  # earlier
+            sooner = (commands[newest + 1] - commands[newest]) * reach[k] > 0
+            self.early = newest + 1 if sooner else 0
+            return newest + sooner
+        return newest
 
 
 def begun(case: Case, attack: Attack, shares: np.ndarray, place: float) -> np.ndarray:
@@ -287,8 +315,15 @@ def test_no_attack_leaves_the_envelope_with_an_encoder_alone(part):
     assert 0.3 < max(ratios) <= 1.0
 
 
+@pytest.mark.parametrize("part", range(5))
+def test_no_attack_leaves_the_envelope_with_jitter(part):
+    ratios = ratios_of(shaken_case, 10 * part, 10, 5)
+    assert len(ratios) >= 3
+    assert 0.3 < max(ratios) <= 1.0
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("family", [random_case, watched_case])
+@pytest.mark.parametrize("family", [random_case, watched_case, shaken_case])
 @pytest.mark.parametrize("part", range(8))
 def test_no_attack_leaves_the_envelope_at_length(part, family):
     """2,000 loops of each family."""
