@@ -119,7 +119,7 @@ def _refinement(member: Member, plain: Contract, better: Contract) -> str:
     )
 
 
-def longest_period(problem: Problem, gains: GainSet, *, proved: bool = False) -> float:
+def longest_period(problem: Problem, gains: GainSet, *, proved: bool = False, refine: bool = False) -> float:
     """The largest control period of all members at which everything is certified, s, by bisection; 0 where none is.
 
     Certified at the period returned, not certified at one a little longer; beyond, nothing is said. Where the own
@@ -128,7 +128,8 @@ def longest_period(problem: Problem, gains: GainSet, *, proved: bool = False) ->
 
     def good(period: float) -> bool:
         slower = at_period(problem, period)
-        return violation(slower, contracts_of(slower, gains), gains) == 0.0
+        found = contracts_of(slower, gains, refine=refine)
+        return violation(slower, found, gains) == 0.0
 
     steps = LINKED_STEPS if problem.linked else STEPS
     low = problem.period

@@ -23,13 +23,14 @@ from ..problem.resolved import resolved
 from ..problem.verdict import from_checker
 from ..simulation import Loop
 from ..study import Study
-from .certify import longest_period, strongest
+from .certify import longest_period, refinable, strongest
 from .condition import condition_lines
 from .contributions import budget_lines, contribution_lines, contributions
 from .falsification import falsify
 from .options import Effort, Options, Progress, effort_of
 from .polish import polished
 from .refusal import refused
+from .reserve import reserve_lines
 from .search import search
 from .start import Tuned, starting_point
 from .validation import agree, validate
@@ -118,19 +119,20 @@ def finished(
     accepted = report.status == 0 and not shown.missed
     parts: tuple[str, ...] = ()
     if accepted and kept is None:
-        notes = (*notes, _rates(problem, tuned))
+        notes = (*notes, _rates(problem, tuned, refine=options.full and refinable(problem)))
         progress.stage("contributions")
         shares = contribution_lines(problem, contributions(problem, tuned.gains))
         condition = condition_lines(problem, tuned.gains, contracts)
-        parts = (*budget_lines(problem, tuned.gains, contracts), *shares, *condition)
+        reserve = reserve_lines(problem, tuned.gains, contracts) if options.full else []
+        parts = (*budget_lines(problem, tuned.gains, contracts), *reserve, *shares, *condition)
     return Design(
         document=proved if accepted else None, report=report, verdicts=tuple(from_checker(report)),
         missed=shown.missed, gains=tuned.gains, problem=problem, shown=shown, notes=notes, parts=parts,
     )  # fmt: skip
 
 
-def _rates(problem: Problem, tuned: Tuned) -> str:
-    own, longest = problem.period, longest_period(problem, tuned.gains, proved=True)
+def _rates(problem: Problem, tuned: Tuned, *, refine: bool) -> str:
+    own, longest = problem.period, longest_period(problem, tuned.gains, proved=True, refine=refine)
     if not longest > own:
         return f"with these gains no control rate below {1 / own:.4g} Hz was found at which it is proved"
     return f"with these gains a control rate down to {1 / longest:.4g} Hz ({longest * 1e3:.4g} ms) is proved too"
