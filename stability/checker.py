@@ -1145,7 +1145,7 @@ FIGURES = entry_of({
         **dict.fromkeys(("largest_error", "maximum_error", "rms_error", "limit_use", "peak_input", "energy_j"),
                         RECORDED),
         "peaks": named(RECORDED), "rms": named(RECORDED), "estimates": listed(RECORDED, 0, 2),
-    })),
+    }, {"travel": RECORDED})),
 })  # fmt: skip
 VALIDATION = entry_of({
     "requirements": listed(entry_of({"name": text, "required": plain_number, "simulated": plain_number,
@@ -2907,9 +2907,10 @@ class Responses:
             known = larger(added(begun.sums[k], times_up(off, self.across(start))), times_up(final, settling))
             more = times_up(first, self._settling(unknown, k))
             found = self._between(acted)
-            for row in found if turn.kicked else []:  # a kick may come before the sample that it is counted after
+            # a kick may be over after the next sample, or begin before the one that it is counted after
+            for row in found if turn.kicked else []:
                 for j in range(turn.n):
-                    row[turn.width - 2 * turn.n + j] += row[turn.width - turn.n + j]
+                    row[turn.width - 2 * turn.n + j] += scaled_up(row[turn.width - turn.n + j], growth)
             self.sums.append((self._between(whole, own=True), found,
                               self._between([[*x, *y] for x, y in zip(known, more, strict=True)])))  # fmt: skip
 

@@ -34,10 +34,11 @@ def run(name: str, output: Path | None, options: Options, allow_code: bool) -> i
     from ..files.seal import to_text
     from ..files.sources import assumed_text
     from ..files.text import check_writable, write_text
+    from ..jobs.challenges import challenges
     from ..jobs.compare import compare, table
     from ..jobs.options import effort_of
     from ..problem import assemble
-    from ..simulation import scenarios, within_assumptions
+    from ..simulation import within_assumptions
     from .progress import bar
 
     study = study_of(name, allow_code)
@@ -47,10 +48,18 @@ def run(name: str, output: Path | None, options: Options, allow_code: bool) -> i
     budget = (effort.population, effort.iterations)
     with bar() as progress:
         found = compare(problem, budget, options.seed_of(study), options, progress)
-    proved = [s.name for s in scenarios(problem) if within_assumptions(problem, s)]
+    proved = [s.name for s in challenges(problem, options.seed_of(study)) if within_assumptions(problem, s)]
     table(found, proved, problem.machine.output_unit, click.echo)
-    each = budget[0] * (budget[1] + 1)
-    click.echo(f"{each} candidates for each, on the same scenarios; * least RMS error of the output", err=True)
+    each, told = budget[0] * (budget[1] + 1), found[0].trials
+    click.echo(
+        f"{each} candidates for each of {len(told)} seeds, tuned on the first runs of the study, scored on all and on "
+        "more; max: the middle seed's largest error after the transient, least and most: of all seeds; limits: largest "
+        "share used; travel: total variation of the input; * the least error",
+        err=True,
+    )
+    for c in found:
+        gains = ", ".join(f"{name} {value:.3g}" for name, value in c.trials[0].gains.items())
+        click.echo(f"{c.name}, first seed: {gains}", err=True)
     click.echo(f"assumed, to be replaced by yours: {assumed_text(problem)}", err=True)
     if output is not None:
         write_text(output, to_text(_data(study, found)))
@@ -63,8 +72,11 @@ def _data(study: Any, found: Any) -> dict[str, Any]:
     from ..simulation.figures import plain
 
     rows = [
-        {"name": c.name, "gains": dict(c.gains), "cost": plain(c.cost), "candidates": c.evaluations,
-         "certified_m": c.certified, "scenarios": {key: m.to_data() for key, m in c.figures.items()}}
+        {"name": c.name, "trials": [
+            {"gains": dict(t.gains), "cost": plain(t.cost), "candidates": t.evaluations, "certified_m": t.certified,
+             "scenarios": {key: m.to_data() for key, m in t.figures.items()}}
+            for t in c.trials
+        ]}
         for c in found
     ]  # fmt: skip
     return {"schema": SCHEMA, "study": study.model_dump(mode="json", exclude_none=True), "controllers": rows}

@@ -1,4 +1,4 @@
-"""The law against its rivals: equal budget, the same scenarios, the same cost, the same knowledge of the plant."""
+"""The law against its rivals: equal budget and seeds, the same scenarios, sensors, cost and knowledge of the plant."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ from ..files.state import State
 from ..files.text import upward
 from ..problem import Problem
 from ..problem.margins import certified_error
-from ..simulation import Figures, Loop, Run, Scenario, scenarios
+from ..simulation import Figures, Loop, Run, Scenario
 from .certify import strongest
+from .challenges import challenges
 from .evaluation import cost_scenarios, simulated_cost
 from .options import Options, Progress
 from .search import search
@@ -32,17 +33,16 @@ from .start import Tuned, starting_point
 
 Array = NDArray[np.float64]
 
-SCHEMA = "hdmm-opt/comparison/2"
-#: Methods that tune the law; the rivals are tuned by the first.
-METHODS = ("jaya", "tlbo")
+SCHEMA = "hdmm-opt/comparison/3"
+#: Method that tunes all, and searches with seeds of their own.
+METHOD, SEEDS = "jaya", 5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contender:
-    """A tuned controller and what it did.
+class Trial:
+    """A controller as one search tuned it, and what it did.
 
     Attributes:
-        name: Law and method.
         gains: Its gains by name.
         cost: Closed-loop cost of the tuning, without any certified part.
         evaluations: Candidates that were simulated or refused for it.
@@ -50,7 +50,6 @@ class Contender:
         figures: Figures by scenario.
     """
 
-    name: str
     gains: Mapping[str, float]
     cost: float
     evaluations: int
@@ -58,20 +57,51 @@ class Contender:
     figures: Mapping[str, Figures]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Contender:
+    """A controller, tuned anew with every seed.
+
+    Attributes:
+        name: Law.
+        trials: One for each seed.
+    """
+
+    name: str
+    trials: tuple[Trial, ...]
+
+    def errors(self, scenario: str) -> list[float]:
+        """Largest errors of the output after the transient in a scenario, m, sorted; infinite for lost runs."""
+        return sorted(trial.figures[scenario].maximum_error_m for trial in self.trials)
+
+    def middle(self, scenario: str) -> Figures:
+        """Figures of the trial with the middle error."""
+        ranked = sorted(self.trials, key=lambda trial: trial.figures[scenario].maximum_error_m)
+        return ranked[len(ranked) // 2].figures[scenario]
+
+    @property
+    def certified(self) -> float | None:
+        """The middle of the certified bounds, m; None where a trial has none."""
+        bounds = sorted(t.certified if t.certified is not None else math.inf for t in self.trials)
+        middle = bounds[len(bounds) // 2]
+        return middle if math.isfinite(middle) else None
+
+
 def compare(
-    problem: Problem, budget: tuple[int, int], seed: int, options: Options, progress: Progress
+    problem: Problem, budget: tuple[int, int], seed: int, options: Options, progress: Progress, *, seeds: int = SEEDS
 ) -> list[Contender]:
-    """Tune the law and its rivals on the study's scenarios, and run them on all.
+    """Tune the law and its rivals on some of the study's scenarios, and score them on all and on others.
 
     Args:
         problem: The problem.
         budget: Population, and evaluations of each candidate of the population, the same for all.
-        seed: Seed of every search.
+        seed: First seed of the searches.
         options: Workers of the law's search.
         progress: Where to report.
+        seeds: Searches of each controller.
 
     Returns:
-        The law tuned by each method, then the rivals.
+        The law, then the rivals. All see the same sensors, observer, delay and limits, tuned on `cost_scenarios` and
+        scored on `challenges`.
 
     Raises:
         InvalidInputError: all gains are fixed, or a plant that the rivals are not made for.
@@ -84,29 +114,34 @@ def compare(
         raise InvalidInputError("a comparison needs gains to search: all are fixed; give one min and max")
     progress.stage("proof of a start")
     first = starting_point(problem, progress)
-    found, loop = [], Loop(problem)
-    for method in METHODS:
-        progress.stage(f"{problem.study.controller.law}: {method}")
-        tuned = search(problem, first, method, budget, seed, options, State(None, {}, resume=False), progress)
-        found.append(_law(loop, tuned, method))
+    loop, law, numbers = Loop(problem), problem.study.controller.law, range(seed, seed + seeds)
+    trials = []
+    for number in numbers:
+        progress.stage(f"{law}, seed {number}")
+        state = State(None, {}, resume=False)
+        trials.append(_law(loop, search(problem, first, METHOD, budget, number, options, state, progress), seed))
+    found = [Contender(name=law, trials=tuple(trials))]
     for name, kind in rivals().items():
-        progress.stage(f"{name}: {METHODS[0]}")
         try:
             laws = [kind(plant=m.plant, modelling=problem.study.controller.modelling) for m in problem.members]
         except ValueError as error:
             raise InvalidInputError(f"{error}; compare another machine") from None
-        found.append(_Rival(problem, name, laws).tuned(budget, seed, progress))
+        rival, trials = _Rival(problem, name, laws), []
+        for number in numbers:
+            progress.stage(f"{name}, seed {number}")
+            trials.append(rival.tuned(budget, number, seed, progress))
+        found.append(Contender(name=name, trials=tuple(trials)))
     return found
 
 
-def _law(loop: Loop, tuned: Tuned, method: str) -> Contender:
-    problem, chosen, given = loop.problem, cost_scenarios(loop.problem), scenarios(loop.problem)
+def _law(loop: Loop, tuned: Tuned, seed: int) -> Trial:
+    problem, chosen, given = loop.problem, cost_scenarios(loop.problem), challenges(loop.problem, seed)
     shown = loop.figures([Run(gains=tuned.gains, scenario=s) for s in (*chosen, *given)])
     best = strongest(problem, tuned.gains).contracts
     bound = None if isinstance(best, Failure) else certified_error(problem, best)
-    return Contender(
-        name=f"{problem.study.controller.law}, {method}", gains=named_gains(problem, tuned.gains),
-        cost=simulated_cost(problem, shown[: len(chosen)]), evaluations=tuned.evaluations, certified=bound,
+    return Trial(
+        gains=named_gains(problem, tuned.gains), cost=simulated_cost(problem, shown[: len(chosen)]),
+        evaluations=tuned.evaluations, certified=bound,
         figures={s.name: m for s, m in zip(given, shown[len(chosen) :], strict=True)},
     )  # fmt: skip
 
@@ -134,9 +169,9 @@ class _Rival:
         gains = dict.fromkeys(self.problem.machine.members, self.values(point))
         return [Run(gains=gains, scenario=scenario) for scenario in chosen]
 
-    def tuned(self, budget: tuple[int, int], seed: int, progress: Progress) -> Contender:
+    def tuned(self, budget: tuple[int, int], seed: int, noise: int, progress: Progress) -> Trial:
         """The rival after a search from the middle of its ranges."""
-        problem, chosen, given = self.problem, cost_scenarios(self.problem), scenarios(self.problem)
+        problem, chosen, given = self.problem, cost_scenarios(self.problem), challenges(self.problem, noise)
         population, rounds = budget
         allowed = Budget(evaluations=population * (rounds + 1), seconds=problem.study.tuning.seconds or math.inf)
 
@@ -151,11 +186,11 @@ class _Rival:
             )
 
         middle = np.full(len(self.schema), 0.5)
-        found = run_search(METHODS[0], evaluate, middle, population, seed, allowed, after=after)
+        found = run_search(METHOD, evaluate, middle, population, seed, allowed, after=after)
         point = found.points[found.best]
         shown = self.loop.figures(self.runs(point, given))
-        return Contender(
-            name=f"{self.name}, {METHODS[0]}", cost=found.outcomes[found.best].cost,
+        return Trial(
+            cost=found.outcomes[found.best].cost,
             gains={spec.name: v for spec, v in zip(self.schema, self.values(point), strict=True)},
             evaluations=found.evaluations, certified=None,
             figures={s.name: m for s, m in zip(given, shown, strict=True)},
@@ -171,7 +206,7 @@ def _outcome(problem: Problem, shown: Sequence[Figures]) -> Outcome:
 
 
 def table(found: Sequence[Contender], proved: Sequence[str], unit: str, writes: Callable[[str], None]) -> None:
-    """Write the comparison as text: a line for each scenario and controller, the best figure marked.
+    """Write the comparison as text: a line for each scenario and controller, the least error marked.
 
     Args:
         found: The controllers.
@@ -179,18 +214,21 @@ def table(found: Sequence[Contender], proved: Sequence[str], unit: str, writes: 
         unit: Unit of the output.
         writes: Called with each line.
     """
-    heads = (f"max [m{unit}]", f"RMS [m{unit}]", "limit use", "certified")
-    widths = (11, 12, 11, 11)
-    writes(f"{'scenario':18}{'controller':16}" + "".join(f"{h:>{w}}" for h, w in zip(heads, widths, strict=True)))
-    for scenario in found[0].figures:
-        best = min(c.figures[scenario].rms_error_m for c in found)
+    heads = (f"max [m{unit}]", "least", "most", f"RMS [m{unit}]", "settled [s]", "limits", "travel", "certified")
+    widths = (11, 10, 10, 11, 12, 8, 10, 11)
+    writes(f"{'scenario':18}{'controller':15}" + "".join(f"{h:>{w}}" for h, w in zip(heads, widths, strict=True)))
+    for scenario in found[0].trials[0].figures:
+        best = min(c.errors(scenario)[len(c.trials) // 2] for c in found)
         for c in found:
-            m = c.figures[scenario]
-            mark = "*" if not m.diverged and m.rms_error_m == best else " "
-            size = (
-                f"{f'lost at {m.diverged_s:.3g} s':>23}"
-                if m.diverged
-                else f"{1e3 * m.maximum_error_m:11.3g}{1e3 * m.rms_error_m:11.3g}{mark}"
-            )
+            errors, m = c.errors(scenario), c.middle(scenario)
             bound = "" if c.certified is None or scenario not in proved else upward(1e3 * c.certified)
-            writes(f"{scenario:18}{c.name:16}{size}{m.limit_use:11.3g}{bound:>11}")
+            sizes = [_size(error) for error in (errors[len(errors) // 2], errors[0], errors[-1])]
+            sizes[0] += "*" if math.isfinite(best) and m.maximum_error_m == best else ""
+            travel = sum(own.travel for own in m.members.values())
+            rest = (_size(m.rms_error_m), f"{m.settling_time_s:.3g}", f"{m.limit_use:.3g}", f"{travel:.4g}", bound)
+            cells = zip((*sizes, *rest), widths, strict=True)
+            writes(f"{scenario:18}{c.name:15}" + "".join(f"{text:>{width}}" for text, width in cells))
+
+
+def _size(error: float) -> str:
+    return f"{1e3 * error:.3g}" if math.isfinite(error) else "lost"

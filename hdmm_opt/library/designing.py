@@ -73,27 +73,30 @@ def compare(
     Raises:
         InvalidInputError: the study cannot be made concrete, or has no gains to search.
     """
+    from ..jobs.challenges import challenges
     from ..jobs.compare import compare as run
     from ..jobs.options import effort_of
     from ..jobs.showing import bar
     from ..problem import assemble
+    from ..simulation import within_assumptions
 
     chosen, options = study_of(study), _options(seed, jobs, budget)
     problem, effort = assemble(chosen), effort_of(chosen, options)
     with bar(quiet=quiet) as progress:
         found = run(problem, (effort.population, effort.iterations), options.seed_of(chosen), options, progress)
+    inside = [s.name for s in challenges(problem, options.seed_of(chosen)) if within_assumptions(problem, s)]
     rows = tuple(
         (
-            c.name, 1e3 * max(f.maximum_error_m for f in c.figures.values()),
-            1e3 * max(f.rms_error_m for f in c.figures.values()), None if c.certified is None else 1e3 * c.certified,
-            c.evaluations,
+            c.name, 1e3 * max(c.middle(name).maximum_error_m for name in inside),
+            1e3 * max(c.middle(name).rms_error_m for name in inside),
+            None if c.certified is None else 1e3 * c.certified, sum(trial.evaluations for trial in c.trials),
         )
         for c in found
     )  # fmt: skip
     unit = f"m{problem.machine.output_unit}"
     heads = ("controller", f"largest error [{unit}]", f"RMS error [{unit}]", f"certified [{unit}]", "candidates")
-    return Table(title=f"{chosen.study.name}: all scenarios", heads=heads, rows=rows, axes=(heads[2], heads[1]),
-                 data=found)  # fmt: skip
+    title = f"{chosen.study.name}: all scenarios inside the assumptions"
+    return Table(title=title, heads=heads, rows=rows, axes=(heads[2], heads[1]), data=found)
 
 
 @alone

@@ -52,7 +52,8 @@ def compose(
     outputs = [_outputs(part, states[i], discrete[i], constants[i], own) for i, part in enumerate(parts)]
     signals = Signals(
         states=states, errors=errors, commanded=[d["commanded"] for d in discrete], outputs=outputs,
-        estimates=[d["observer"] for d in discrete], apart=_distance(place - wanted), t=t, tau=tau,
+        travels=[d["travel"] for d in discrete], estimates=[d["observer"] for d in discrete],
+        apart=_distance(place - wanted), t=t, tau=tau,
     )  # fmt: skip
     shown: dict[str, Any] = {"x": x, "place": place, "wanted": wanted}
     for key in ("law", "commanded", "errors"):
@@ -211,4 +212,5 @@ def _controlled(
         seen, r, discrete["law"], constants["gains"], nominal, load, part.period
     )  # fmt: skip
     applied = discrete["applied"] if part.waiting else _delivered(u, constants, t, extras)
-    return ca.vertcat(after, u, applied, errors, following, discrete["pending"])
+    travel = discrete["travel"] + ca.norm_1(u - discrete["commanded"])
+    return ca.vertcat(after, u, applied, errors, travel, following, discrete["pending"])

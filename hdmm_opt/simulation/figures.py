@@ -23,6 +23,7 @@ class MemberFigures:
         rms_error: RMS error after the transient.
         limit_use: Largest share of a limit that it used; 1 where an input saturated.
         peak_input: Largest norm of its commanded input.
+        travel: Total variation of its commanded input, from zero.
         peaks: Largest size of each output, such as "torque" and "current".
         rms: RMS of each over the run.
         energy_j: Mechanical energy that it delivered, with sign.
@@ -34,6 +35,7 @@ class MemberFigures:
     rms_error: float
     limit_use: float
     peak_input: float
+    travel: float
     peaks: Mapping[str, float]
     rms: Mapping[str, float]
     energy_j: float
@@ -127,6 +129,7 @@ def _member(part: Part, found: Mapping[str, float], gone: bool, ticks: int, late
         rms_error=math.inf if gone else math.sqrt(found[f"squares {name}"] / late),
         limit_use=found[f"use {name}"],
         peak_input=found[f"input {name}"],
+        travel=found[f"travel {name}"],
         peaks={key: found[f"peak {key} {name}"] for key in outputs},
         rms={key: math.sqrt(found[f"squares {key} {name}"] / ticks) for key in outputs},
         energy_j=found.get(f"sum power {name}", math.nan) * period,

@@ -70,7 +70,7 @@ class Part:
         return found
 
     def discrete(self, z: Any) -> dict[str, Any]:
-        """Its discrete states by name: law, commanded, applied, errors, observer, pending."""
+        """Its discrete states by name: law, commanded, applied, errors, travel, observer, pending."""
         return self.cut(z[self.z], self.discrete_sizes)
 
     def constants(self, fixed: Any) -> dict[str, Any]:
@@ -82,6 +82,7 @@ class Part:
         """Sizes of its discrete states."""
         inputs = len(self.law.plant.inputs)
         return {"law": self.law.states, "commanded": inputs, "applied": inputs, "errors": self.errors,
+                "travel": 1,
                 "observer": 0 if self.observer is None else SIZE,
                 "pending": inputs * (self.waiting + self.early)}  # fmt: skip
 

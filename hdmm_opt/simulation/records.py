@@ -29,7 +29,7 @@ class Signals:
     """What records are made of, as expressions, member by member.
 
     Attributes:
-        states, errors, commanded, outputs, estimates: Of each member.
+        states, errors, commanded, outputs, travels, estimates: Of each member.
         apart: Distance of the output from its reference.
         t, tau: Time of the tick and since the tick, s.
     """
@@ -38,6 +38,7 @@ class Signals:
     errors: list[Any]
     commanded: list[Any]
     outputs: list[dict[str, Any]]
+    travels: list[Any]
     estimates: list[Any]
     apart: Any
     t: Any
@@ -83,6 +84,7 @@ def _of_member(part: Part, signals: Signals, i: int, late: Any) -> list[Record]:
         Record(name=f"squares {name}", kind="sum", value=ca.if_else(late, error**2, 0)),
         Record(name=f"use {name}", kind="max", value=use, between=True),
         Record(name=f"input {name}", kind="max", value=size),
+        Record(name=f"travel {name}", kind="max", value=signals.travels[i]),
     ]
     for output, value in signals.outputs[i].items():
         if output == "power":

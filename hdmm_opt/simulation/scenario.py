@@ -117,6 +117,8 @@ def within_assumptions(problem: Problem, scenario: Scenario) -> bool:
 
     Faults may only take effectiveness that is allowed for, and disturbances change no faster than the study says.
     """
+    if any(abs(share) > 1 for share in (*scenario.parameters.values(), scenario.initial)):
+        return False
     for name, course in scenario.disturbances.items():
         rate = problem.rate_of(name)
         if rate is not None and _steepest(course) > rate * (1 + 1e-9):

@@ -161,7 +161,7 @@ FIGURES = entry_of({
         **dict.fromkeys(("largest_error", "maximum_error", "rms_error", "limit_use", "peak_input", "energy_j"),
                         RECORDED),
         "peaks": named(RECORDED), "rms": named(RECORDED), "estimates": listed(RECORDED, 0, 2),
-    })),
+    }, {"travel": RECORDED})),
 })  # fmt: skip
 VALIDATION = entry_of({
     "requirements": listed(entry_of({"name": text, "required": plain_number, "simulated": plain_number,

@@ -147,9 +147,10 @@ class Responses:
             known = larger(added(begun.sums[k], times_up(off, self.across(start))), times_up(final, settling))
             more = times_up(first, self._settling(unknown, k))
             found = self._between(acted)
-            for row in found if turn.kicked else []:  # a kick may come before the sample that it is counted after
+            # a kick may be over after the next sample, or begin before the one that it is counted after
+            for row in found if turn.kicked else []:
                 for j in range(turn.n):
-                    row[turn.width - 2 * turn.n + j] += row[turn.width - turn.n + j]
+                    row[turn.width - 2 * turn.n + j] += scaled_up(row[turn.width - turn.n + j], growth)
             self.sums.append((self._between(whole, own=True), found,
                               self._between([[*x, *y] for x, y in zip(known, more, strict=True)])))  # fmt: skip
 

@@ -181,8 +181,9 @@ class _Sum:
         ])  # fmt: skip
         ends = np.cumsum((n + q, pulses, n))
         sums = [Sums(*np.split(part, ends, axis=1)) for part in self._between(values)]
-        for part in sums if self.stack.kicked else []:  # a kick may come before the sample that it is counted after
-            part.pulses[:, pulses - n :] += part.noise
+        # a kick may be over after the next sample, or begin before the one that it is counted after
+        for part, growth in zip(sums if self.stack.kicked else [], growths, strict=False):
+            part.pulses[:, pulses - n :] += growth * part.noise
         made = Responses(
             stack=self.stack, basis=self.basis, groups=groups, plain=sums[0],
             weighted=dict(zip(self.growths, sums[1:], strict=True)),

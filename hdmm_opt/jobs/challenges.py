@@ -1,0 +1,46 @@
+"""Scenarios on which tuned controllers are scored: those of the study, and what no controller was tuned on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..plants import Parameter
+from ..problem import Problem
+from ..simulation import Scenario, scenarios
+
+#: Parameters that stand for the gain of the plant and for the lag of its drive, and values that they are tried at.
+GAIN, LAG, SLOW = "torque_scale", "drive_lag", 1e-3
+#: So many times the assumed initial error.
+FAR = 10.0
+
+
+def challenges(problem: Problem, seed: int) -> list[Scenario]:
+    """The study's scenarios, then a constant load, a far start, half and twice the gain, and a slow drive, all noisy.
+
+    Args:
+        problem: The problem.
+        seed: Seed of the noise.
+
+    Those that the machine has no parameter or no disturbance for are left out. Not all are inside the assumptions.
+    """
+    return [*scenarios(problem), *_more(problem, seed)]
+
+
+def _more(problem: Problem, seed: int) -> Iterator[Scenario]:
+    high = {d.name: ((0.0, problem.disturbance(d.name).high),) for d in problem.machine.disturbances}
+    if high:
+        yield Scenario(name="held-load", disturbances=high, noise=1.0, seed=seed)
+    yield Scenario(name="far-start", initial=FAR, noise=1.0, seed=seed + 1)
+    plants = [member.plant for member in problem.members]
+    if all(GAIN in plant.parameters for plant in plants):
+        for name, factor in (("half-gain", 0.5), ("double-gain", 2.0)):
+            share = {GAIN: _position(plants[0].parameters[GAIN], factor * plants[0].parameters[GAIN].value)}
+            yield Scenario(name=name, disturbances=high, parameters=share, noise=1.0, seed=seed + 2)
+    if all(LAG in plant.parameters for plant in plants):
+        share = {LAG: _position(plants[0].parameters[LAG], SLOW)}
+        yield Scenario(name="slow-drive", disturbances=high, parameters=share, noise=1.0, seed=seed + 3)
+
+
+def _position(parameter: Parameter, value: float) -> float:
+    """Where a value lies in a parameter's tolerance, beyond -1 and 1 where it is outside."""
+    return (value / parameter.value - 1) / parameter.tolerance if parameter.tolerance else 0.0
