@@ -63,8 +63,8 @@ def content(path):
     return data
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kills", [2, pytest.param(20, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("kills", [2, 20])
 def test_a_design_that_is_killed_again_and_again_ends_with_the_same_file(kills, small, tmp_path):
     begun = time.monotonic()
     finish(hdmm(tmp_path, "design", small, "-o", "whole.gains.json"))

@@ -66,7 +66,7 @@ def simulate(rows, period, share, seed, seconds=4.0, substeps=8):
     return worst
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(st.integers(0, 10**6))
 def test_what_is_proved_holds_in_simulation(seed):
     random = np.random.default_rng(seed)
