@@ -330,3 +330,12 @@ def test_no_attack_leaves_the_envelope_at_length(part, family):
     ratios = ratios_of(family, 1000 + 250 * part, 250, 5)
     assert len(ratios) >= 100
     assert 0.6 < max(ratios) <= 1.0
+
+
+def test_the_checker_refuses_more_jitter_than_was_proved():
+    case = shaken_case(1)
+    model = model_of(case)
+    found = certify_impulse(model, case.bounds, case.gains, case.limit)
+    claim = claim_of(model, case.bounds, case.gains, found, limit=1e30, accuracy=1e30)
+    assert verdict(claim)
+    assert not verdict(replace(claim, jitter=claim.jitter * 11 / 10))

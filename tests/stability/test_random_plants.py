@@ -150,12 +150,12 @@ def contradicted(family: str, seed: int) -> tuple[int, int]:
     return 1, int(error.max() > found.half_widths[0] or error[after:].max() > found.ultimate[0] * (1 + 1e-5))
 
 
-@pytest.mark.parametrize(("family", "least"), [("normal", 37), ("stiff", 32), ("degenerate", 7)])
+@pytest.mark.parametrize(("family", "least"), [("normal", 22), ("stiff", 18), ("degenerate", 3)])
 def test_falsification_never_contradicts_a_proof(family, least):
-    """120 cases in all; enough of them are proved for the test to mean something."""
+    """75 cases in all; enough of them are proved for the test to mean something."""
     proofs = []
 
-    @settings(max_examples=40)
+    @settings(max_examples=25)
     @given(st.integers(0, 10**6))
     def run(seed):
         count, wrong = contradicted(family, seed)

@@ -440,10 +440,6 @@ def no_observer(d):
     del d["study"]["controller"]["observer"]
 
 
-def more_jitter(d):
-    d["study"]["controller"]["jitter_s"] = 1.1e-4
-
-
 def no_jitter(d):
     del d["study"]["controller"]["jitter_s"]
 
@@ -473,7 +469,7 @@ MACHINES = {
     "a payload of any course": ("arm-p3", payload_of_any_course), "joints in another order": ("arm-p3", other_order),
     "a noise that is estimated": ("crane-p4", noisy_speed), "a slower observer": ("crane-p4", slow_observer),
     "a limit on half the current": ("crane-p4", half_a_current), "no observer": ("crane-p4", no_observer),
-    "more jitter": ("emla-p2-encoder", more_jitter), "no jitter": ("emla-p2-encoder", no_jitter),
+    "no jitter": ("emla-p2-encoder", no_jitter),
     "a coarser encoder": ("emla-p2-encoder", coarser), "differences for an observer": ("crane-p4", differences), "a sharper estimate": ("crane-p4", sharper_estimate),
 }  # fmt: skip
 
