@@ -218,11 +218,11 @@ def table(found: Sequence[Contender], proved: Sequence[str], unit: str, writes: 
     widths = (11, 10, 10, 11, 12, 8, 10, 11)
     writes(f"{'scenario':18}{'controller':15}" + "".join(f"{h:>{w}}" for h, w in zip(heads, widths, strict=True)))
     for scenario in found[0].trials[0].figures:
-        best = min(c.errors(scenario)[len(c.trials) // 2] for c in found)
+        best = min(c.middle(scenario).maximum_error_m for c in found)
         for c in found:
             errors, m = c.errors(scenario), c.middle(scenario)
             bound = "" if c.certified is None or scenario not in proved else upward(1e3 * c.certified)
-            sizes = [_size(error) for error in (errors[len(errors) // 2], errors[0], errors[-1])]
+            sizes = [_size(error) for error in (m.maximum_error_m, errors[0], errors[-1])]
             sizes[0] += "*" if math.isfinite(best) and m.maximum_error_m == best else ""
             travel = sum(own.travel for own in m.members.values())
             rest = (_size(m.rms_error_m), f"{m.settling_time_s:.3g}", f"{m.limit_use:.3g}", f"{travel:.4g}", bound)

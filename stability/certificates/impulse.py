@@ -27,7 +27,8 @@ from ..loops.box import Box, DeviationRows, UnboundedError
 from ..loops.deviation import NOTHING, deviation_rows, first_box, networks, rounded
 from ..loops.model import Bounds, Gains, LoopModel
 from ..loops.responses import Responses, responses
-from ..loops.stack import MAX_DELAY, Controller, Stack, controller, delay_of, turn, wiring
+from ..loops.stack import MAX_DELAY, Controller, Stack, controller, delay_of, wiring
+from ..loops.turn import turn
 from .certificate import Certificate, Failure
 from .small_gain import Cell, Cut, cell_of, cells_of, closed, cut_for, late_of, middle_of, small_gain
 

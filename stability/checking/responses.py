@@ -77,7 +77,7 @@ class Responses:
         # a matrix that is not negative has a spectral radius below 1 where I - N has an inverse that is not negative
         if min(v for row in found for v in row) < 0 or not all(grown[i][i] > 0 for i in range(count)):
             raise NotProvedError("the loop does not contract in the coordinates of its certificate")
-        reach = [[-(-(v.numerator << FIXED) // v.denominator) for v in row] for row in found]
+        reach = [[scaled_up(WHOLE, v) for v in row] for row in found]
         missed = times_ratio(self.missed, growth.numerator, growth.denominator)
         return reach, times_up(times_up(reach, missed), reach)
 
@@ -133,7 +133,7 @@ class Responses:
         last = self.lengths(row)
         now, given = self._current(), self._given()
         (area, held), entry = grid.tail(), self.across(acting)
-        unsure = [[-(-(v.numerator << FIXED) // v.denominator)] for v in turn.started()[1]]
+        unsure = [[scaled_up(WHOLE, v)] for v in turn.started()[1]]
         unknown = self.bounded(times_up(self.back.sizes(), unsure))
         self.sums = []
         for k, growth in enumerate((Fraction(1), cell.growth)):
@@ -217,7 +217,7 @@ class Responses:
         for r in range(self.count if turn.kicked else 0):
             if r % size < n:
                 for j, value in enumerate(turn.jitter.grown[r % size] if turn.jitter else []):
-                    found[r][place + j] += -(-(value.numerator << FIXED) // value.denominator)
+                    found[r][place + j] += scaled_up(WHOLE, value)
         return found
 
     def _current(self) -> Whole:
@@ -240,8 +240,7 @@ class Responses:
         late = turn.claim.jitter / turn.claim.period
         for r in range(self.count if turn.kicked else 0):
             for j in range(turn.q if r % size >= 2 * turn.n else 0):
-                value = late * turn.direct[r % size - 2 * turn.n][j]
-                found[r][turn.n + j] += -(-(value.numerator << FIXED) // value.denominator)
+                found[r][turn.n + j] += scaled_up(WHOLE, late * turn.direct[r % size - 2 * turn.n][j])
         return found
 
     def _between(self, values: Whole, *, own: bool = False) -> Whole:
@@ -255,7 +254,7 @@ class Responses:
             speed = [*a[n : 2 * n], *[[0] * width for _ in range(q)]]
             speed = added(speed, ball(turn.sources).sizes()) if own else speed
             curved = times_up(times_up(bend, self._piece(h).ceiling), speed)
-            square = -(-((h * h / 8).numerator << FIXED) // (h * h / 8).denominator)
+            square = scaled_up(WHOLE, h * h / 8)
             more = [[(v * square >> FIXED) + 1 for v in row] for row in curved]
             best = larger(best, added(larger(a, b), more))
         return [*best, *values[self.count :]]

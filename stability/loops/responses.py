@@ -26,8 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .basis import Basis, basis_of, diagonal
-from .stack import Stack, Turn, turn
+from .stack import Stack
 from .substep import SubStep
+from .turn import Turn, turn
 
 Array = NDArray[np.float64]
 

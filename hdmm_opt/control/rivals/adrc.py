@@ -49,10 +49,10 @@ class Adrc(Cascade):
         correction = (1 - p**3, 1.5 * (1 - p) ** 2 * (1 + p) / period, (1 - p) ** 3 / period**2)
         place, speed, unknown = (z[k] + correction[k] * (x[0] - z[0]) for k in range(3))
         # a modelling term that holds the reference's acceleration takes its part of the command
-        known, ahead = (r[2], 0) if "mechanics" in self.modelling else (0, r[2])
+        ahead = self.ahead(r)
         wanted = ahead + 2 * closed * (r[1] - speed) + closed**2 * (r[0] - place) - unknown
         value, given = command(share * wanted)
-        acting = known + given / share + unknown
+        acting = r[2] - ahead + given / share + unknown
         after = ca.vertcat(place + period * speed + period**2 / 2 * acting, speed + period * acting, unknown)
         return value, after
 

@@ -96,6 +96,10 @@ class Cascade(ABC):
             u = value
         return limited(plant, u), after, ca.vertcat(x[0] - r[0])
 
+    def ahead(self, r: Any) -> Any:
+        """The reference's acceleration, where no modelling term holds it."""
+        return 0 if "mechanics" in self.modelling else r[2]
+
     def _per_acceleration(self, x: Any, following: list[int]) -> Any:
         """Torque or current that a unit of acceleration takes on the nominal plant: mass over gain of its row."""
         import casadi as ca
@@ -106,6 +110,14 @@ class Cascade(ABC):
         gain, mass = ca.substitute([ca.jacobian(plant.force[SPEED], source), plant.mass[SPEED]], [plant.p], [nominal])
         values = [x, ca.SX.zeros(plant.u.numel()), ca.SX.zeros(plant.w.numel())]
         return mass / ca.substitute([gain], [plant.x, plant.u, plant.w], values)[0]
+
+
+def frozen(wanted: Any, given: Any, growth: Any) -> Any:
+    """The growth of an integral; none while it would push the limited command further outwards."""
+    import casadi as ca
+
+    outwards = ca.logic_and(ca.fabs(wanted - given) > 1e-9, (wanted - given) * growth > 0)
+    return ca.if_else(outwards, 0, growth)
 
 
 def searched(name: str, unit: str, meaning: str, low: float, high: float) -> GainSpec:

@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from ..law import GainSpec
-from .cascade import Cascade, Command, searched
+from .cascade import Cascade, Command, frozen, searched
 
 
 class DriveCascade(Cascade):
@@ -38,16 +38,11 @@ class DriveCascade(Cascade):
 
     def outer(self, x: Any, r: Any, z: Any, gains: Any, command: Command, period: float) -> tuple[Any, Any]:
         """The command, and the integral after a period."""
-        import casadi as ca
-
         position, speed, time, share = (gains[k] for k in range(4))
         error = r[1] + position * (r[0] - x[0]) - x[1]
-        # a modelling term that holds the reference's acceleration is the feedforward
-        ahead = 0 if "mechanics" in self.modelling else share * r[2]
-        wanted = speed * (error + z[0]) + ahead
+        wanted = speed * (error + z[0]) + share * self.ahead(r)
         value, given = command(wanted)
-        outwards = ca.logic_and(ca.fabs(wanted - given) > 1e-9, (wanted - given) * error > 0)
-        return value, z[0] + ca.if_else(outwards, 0, period / time * error)
+        return value, z[0] + period / time * frozen(wanted, given, error)
 
 
 RIVAL = DriveCascade

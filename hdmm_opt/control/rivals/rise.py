@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from ..law import GainSpec
-from .cascade import Cascade, Command, searched
+from .cascade import Cascade, Command, frozen, searched
 
 
 class Rise(Cascade):
@@ -46,8 +46,7 @@ class Rise(Cascade):
         wanted = stiff * filtered + z[0]
         value, given = command(wanted)
         growth = stiff * second * filtered + sign * ca.sign(filtered)
-        outwards = ca.logic_and(ca.fabs(wanted - given) > 1e-9, (wanted - given) * growth > 0)
-        return value, z[0] + period * ca.if_else(outwards, 0, growth)
+        return value, z[0] + period * frozen(wanted, given, growth)
 
 
 RIVAL = Rise

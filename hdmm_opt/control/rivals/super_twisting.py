@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from ..law import GainSpec
-from .cascade import Cascade, Command, searched
+from .cascade import Cascade, Command, frozen, searched
 
 
 class SuperTwisting(Cascade):
@@ -42,12 +42,9 @@ class SuperTwisting(Cascade):
         slope, root, sign = (gains[k] for k in range(3))
         rate = r[1] - x[1]
         sliding = slope * (r[0] - x[0]) + rate
-        ahead = 0 if "mechanics" in self.modelling else r[2]
-        wanted = ahead + slope * rate + root * ca.sign(sliding) * ca.sqrt(ca.fabs(sliding)) + z[0]
+        wanted = self.ahead(r) + slope * rate + root * ca.sign(sliding) * ca.sqrt(ca.fabs(sliding)) + z[0]
         value, given = command(wanted)
-        growth = sign * ca.sign(sliding)
-        outwards = ca.logic_and(ca.fabs(wanted - given) > 1e-9, (wanted - given) * growth > 0)
-        return value, z[0] + ca.if_else(outwards, 0, period * growth)
+        return value, z[0] + period * frozen(wanted, given, sign * ca.sign(sliding))
 
 
 RIVAL = SuperTwisting
