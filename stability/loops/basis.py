@@ -97,10 +97,16 @@ def _plane(f: Array, cluster: Any) -> Array:
     plane = np.linalg.svd(wanted)[2][-count:].T
     found: Any = schur(plane.T @ f @ plane)
     form, turned = found
-    lengths = [1.0]
+    share, lengths = SHARE * _room(cluster), [1.0]
     for j in range(1, count):  # every vector so short that it adds little of those before it
-        beside, back = max(float(np.max(np.abs(form[:j, j]))), 1e-300), abs(form[j, j - 1])
-        lengths.append(lengths[-1] * max(min(1.0, SHARE * _room(cluster) / beside), np.sqrt(back / beside)))
+        above = np.abs(form[:j, j])
+        if form[j, j - 1] != 0:  # the second of a pair, balanced with the first
+            beside = max(float(above[-1]), 1e-300)
+            lengths.append(lengths[-1] * max(min(1.0, share / beside), np.sqrt(abs(form[j, j - 1]) / beside)))
+            continue
+        if j + 1 < count and form[j + 1, j] != 0:
+            above = np.maximum(above, np.abs(form[:j, j + 1]))
+        lengths.append(lengths[-1] * min(1.0, share / max(float(above.max()), 1e-300)))
     return np.asarray(plane @ turned @ np.diag(lengths), dtype=np.float64)
 
 

@@ -10,7 +10,7 @@ from hdmm_opt.files.read import read
 from hdmm_opt.files.restore import restored
 from hdmm_opt.jobs.certify import contracts_of, strongest
 from hdmm_opt.jobs.reserve import reserve_lines
-from stability import Failure
+from stability import Failure, Interval
 
 GAINS = Path(__file__).parents[2] / "notebooks" / "gains"
 
@@ -40,3 +40,10 @@ def test_what_knows_no_end_says_at_least(restoring):
     members = tuple(m.under(replace(m.bounds, noise=tuple(1e-3 * v for v in m.bounds.noise))) for m in problem.members)
     told, _ = reserve_lines(replace(problem, members=members), gains, strongest(problem, gains).contracts)
     assert "measurement errors at least 8 times as large" in told
+
+
+def test_a_quicker_drive_is_proved_with_the_same_gains():
+    """Two poles at zero beside a fast pair: a block of four, whose coordinates must keep its norm below 1."""
+    problem, gains = restored(read(GAINS / "emla-p2-encoder.gains.json"))
+    quicker = problem.members[0].bounds.parameters | {"drive_lag": Interval(2.4e-4, 3.6e-4)}
+    assert certified(problem, gains, parameters=quicker)
