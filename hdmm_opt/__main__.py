@@ -1,11 +1,10 @@
 """The program: `hdmm-opt`, and `python -m hdmm_opt`."""
 
-import os
 import signal
 from types import FrameType
 
 #: Code that may drop an interrupt or make another error of it: Python's imports, and CasADi.
-DEAF = ("<frozen importlib._bootstrap>", os.path.join("casadi", "casadi.py"))
+DEAF = ("<frozen importlib._bootstrap>", "casadi/casadi.py")
 #: How long an interrupt that came there waits, s.
 PAUSE = 0.05
 
