@@ -17,28 +17,16 @@ from hdmm_opt.files.seal import seal, to_text
 from stability import checker
 
 
-@pytest.fixture(scope="module")
-def text():
-    from conftest import GAINS
-
-    return (GAINS / "arm-p3.gains.json").read_text(encoding="utf-8")
+@pytest.fixture
+def document(arm_text):
+    return json.loads(arm_text)
 
 
 @pytest.fixture
-def document(text):
-    return json.loads(text)
-
-
-def judged(document):
+def judged(arm_text):
     """The checker's report, with all that the file repeats made right again, as a careful forger would."""
-    return checker.check_text(forged(document, recorded()))
-
-
-def recorded():
-    """Obligations of the committed file."""
-    from conftest import GAINS
-
-    return json.loads((GAINS / "arm-p3.gains.json").read_text(encoding="utf-8"))["obligations"]
+    kept = json.loads(arm_text)["obligations"]
+    return lambda document: checker.check_text(forged(document, kept))
 
 
 def member(d, name):
@@ -53,9 +41,9 @@ def by(text, factor):
     return str(Fraction(text) * Fraction(factor))
 
 
-def test_the_checker_alone_agrees(text, tmp_path):
+def test_the_checker_alone_agrees(arm_text, tmp_path):
     path = tmp_path / "arm.gains.json"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(arm_text, encoding="utf-8")
     run = subprocess.run([sys.executable, "-I", "-S", checker.__file__, path], capture_output=True, text=True)
     assert run.returncode == 0 and "all 3 members together" in run.stdout
 
@@ -259,14 +247,14 @@ MUTATIONS = {
 
 
 @pytest.mark.parametrize("mutate", MUTATIONS, ids=lambda f: f.__name__)
-def test_a_bent_statement_is_refused(document, mutate):
+def test_a_bent_statement_is_refused(document, judged, mutate):
     mutate(document)
     report = judged(document)
     status, words = MUTATIONS[mutate]
     assert report.status == status and words in report.message and "\n" not in report.message, report.message
 
 
-def test_a_sealed_file_is_still_proved(document):
+def test_a_sealed_file_is_still_proved(document, judged):
     """What makes the mutations above be refused is their mutation."""
     assert judged(document).status == 0
 
@@ -289,11 +277,11 @@ def test_a_file_about_another_machine_is_not_simulated(document, mutate):
         restored(document)
 
 
-def test_verbs_of_machines(text, tmp_path, monkeypatch):
+def test_verbs_of_machines(arm_text, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = CliRunner()
     path = tmp_path / "arm.gains.json"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(arm_text, encoding="utf-8")
     assert run.invoke(main, ["check", str(path)]).exit_code == 0
     shown = run.invoke(main, ["simulate", str(path), "--scenario", "two-degraded", "--csv", "a.csv", "--json"])
     assert shown.exit_code == 0 and json.loads(shown.stdout)["two-degraded"]["maximum_error_m"] < 0.02
