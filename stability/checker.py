@@ -981,7 +981,13 @@ def unit(value: Any, where: str) -> None:
 
 def target(value: Any, where: str) -> None:
     """What a row tracks."""
-    if not isinstance(value, Fraction):
+    if isinstance(value, dict):
+        need(len(value) <= 8, f"{where} has at most 8 signals")
+        for key, share in value.items():
+            for part in key.split("/", 1):
+                name(part, where)
+            plain_number(share, where)
+    elif not isinstance(value, Fraction):
         some("reference", "zero")(value, where)
 
 
@@ -1053,7 +1059,7 @@ STUDY = entry_of(
         "plant": entry_of(
             {"model": text, "parameters": NOTHING, "ratings": NOTHING, "limits": NOTHING,
              "joints": named(DRIVE, MAX_MEMBERS), "locked": named(plain_number)},
-            {"level": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
+            {"level": name, "sensor": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
         ),
         "uncertainty": entry_of({
             "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit},
@@ -1607,9 +1613,10 @@ def well_formed(claim: Claim) -> None:
     units = {row["state"]: row["unit"] for row in claim.rows}
     for limit in claim.limits[1:]:
         alike = {state for state, unit in units.items() if unit == limit["unit"]}
-        need(
-            set(limit["signals"]) == alike, f"the limit on {limit['name']} must be about every state in {limit['unit']}"
-        )
+        limited = {
+            signal for other in claim.limits[1:] if other["unit"] == limit["unit"] for signal in other["signals"]
+        }
+        need(limited == alike, f"the limits in {limit['unit']} must be about every state in {limit['unit']}")
 
 
 def _kinematic(claim: Claim) -> None:
@@ -1864,7 +1871,10 @@ def rows_of(model: dict[str, Any]) -> tuple[list[dict[str, Any]], list[int], lis
     need(1 <= n <= MAX_ROWS and 1 <= m <= n, f"1 to {MAX_ROWS} rows are needed: got {n}")
     for i, row in enumerate(rows):
         target = row["target"]
-        if target not in ("reference", "zero"):
+        if isinstance(target, dict):
+            need(row["controlled"] is False, "a row under the law tracks the reference, zero, or a row")
+            row["target"] = {name: number(share, "a row's target") for name, share in target.items()}
+        elif target not in ("reference", "zero"):
             row["target"] = index(target, i, "a row's target")
             need(rows[row["target"]]["controlled"] is True, "a row's target must be a controlled row")
         need(
@@ -2032,6 +2042,24 @@ def printable(unit: Any) -> bool:
 
 # --- loop ---
 
+def placed(target: Any) -> dict[str, Fraction]:
+    """Coefficients of the signals whose sum is the target of a row that follows no other."""
+    if isinstance(target, dict):
+        return target
+    return {"r0": Fraction(1)} if target == "reference" else {}
+
+
+def joined(program: dict[str, Any], names: set[str]) -> dict[str, Any]:
+    """An operation list with the quotients of two inputs that are named "A/B" as inputs of their own."""
+    operations = program["operations"]
+    read = {k: operation[1] for k, operation in enumerate(operations) if operation[0] == "input"}
+    made = []
+    for operation in operations:
+        name = "/".join(str(read.get(k, "")) for k in operation[1:]) if operation[0] == "div" else ""
+        made.append(["input", name] if name in names else operation)
+    return {**program, "operations": made}
+
+
 class Loop:
     """M_i z_i' = sum_j J_ij z_j + sum_k B_ik v_k + d_i + M_i φ*_j' around the operating point x*(t).
 
@@ -2040,7 +2068,7 @@ class Loop:
     """
 
     def __init__(self, claim: Claim, inflate: Fraction) -> None:
-        tracked = {row["target"] for row in claim.rows}
+        tracked = {row["target"] for row in claim.rows if isinstance(row["target"], int)}
         states = {row["state"] for row in claim.rows}
         for i, term in zip(claim.controlled, claim.law, strict=True):
             need(i not in tracked or not states & reads(term), "the modelling term of a tracked row reads a state")
@@ -2068,6 +2096,11 @@ class Loop:
             if name not in claim.nominal:
                 self._name(f"nominal.{name}", {f"w:{name}": ONE})
             self._name(name, plus({f"w:{name}": ONE}, self.nodes[name].form))
+        self.rated, self.quotients = dict(claim.feedforward), set()
+        for row in claim.rows:
+            for name in placed(row["target"]):
+                if "/" in name and name not in self.quotients:
+                    self._quotient(name, *name.split("/", 1))
         for k, bounds in enumerate(claim.reference):
             table.ranges[f"r{k}"] = bounds
             self._name(f"r{k}", {f"r{k}": ONE})
@@ -2083,6 +2116,18 @@ class Loop:
             self._control(i)
         for k, (name, row) in enumerate(zip(claim.inputs, claim.input_map, strict=True)):
             self._name(name, plus(self.kappa(row), {f"e{k}": ONE}))
+
+    def _quotient(self, name: str, load: str, parameter: str) -> None:
+        """A disturbance of bounded rate over a constant, which is another one."""
+        claim = self.claim
+        known = load in claim.feedforward and parameter in claim.parameters and parameter != VARYING
+        need(known, "a target divides a disturbance of bounded rate by a constant")
+        by = inverse(claim.parameters[parameter])
+        span, rate = (mul(part, by) for part in claim.feedforward[load])
+        self.quotients.add(name)
+        self.rated[name], self.table.ranges[f"w:{name}"] = (span, rate), span
+        self._stated(name, mul(claim.disturbances[load], by), changing=True)
+        self._name(name, plus({f"w:{name}": ONE}, self.nodes[name].form))
 
     def _name(self, name: str, form: Form) -> None:
         self.nodes[name] = Node(self.table.key("input", name), form, self.table.over(form))
@@ -2100,9 +2145,29 @@ class Loop:
     def target(self, i: int) -> Form:
         """The operating value of state i."""
         target = self.claim.rows[i]["target"]
-        if target == "reference":
-            return {"r0": ONE}
-        return {} if target == "zero" else self.kappa(target)
+        if isinstance(target, int):
+            return self.kappa(target)
+        return plus({}, *(times(self._signal(name), (share, share)) for name, share in placed(target).items()))
+
+    def _signal(self, name: str) -> Form:
+        """A derivative of the reference; or a disturbance, its middle where its rate has no bound."""
+        if name in ("r0", "r1", "r2"):
+            return {name: ONE}
+        if name in self.rated:
+            return {f"w:{name}": ONE}
+        need(name in self.nodes and name != "r3", "what a row tracks is made of r0, r1, r2 and disturbances")
+        low, high = self.nodes[name].range
+        middle = down((low + high) / 2)
+        return {"": (middle, middle)}
+
+    def _driven(self, i: int) -> int:
+        """The row that what carries out κ_i acts in: row i, or where that does not read it, the only one that does."""
+        claim, n = self.claim, len(self.claim.rows)
+        found = [row["state"] for row in claim.rows if row["target"] == i]
+        follower = found[0] if found else claim.inputs[claim.input_map.index(i)]
+        read = [reads(claim.plant, [claim.plant["outputs"][n + j]]) for j in range(n)]
+        reading = [j for j, row in enumerate(claim.rows) if row["state"] != follower and follower in read[j]]
+        return i if i in reading or len(reading) != 1 else reading[0]
 
     def kappa(self, i: int) -> Form:
         """The operating value of row i's control: m_i, less φ*_i where it has a network."""
@@ -2122,7 +2187,7 @@ class Loop:
     def _error(self, i: int) -> Fraction:
         """Bound on |Q_i|: z_i, what its target asks for, and what its network misses."""
         claim, target = self.claim, self.claim.rows[i]["target"]
-        if isinstance(target, str):
+        if not isinstance(target, int):
             return claim.half_widths[i]
         missed = claim.network_bound[claim.networks.index(target)] if target in claim.networks else Fraction(0)
         return claim.half_widths[i] + self.half[target][1] * self._error(target) + missed
@@ -2130,7 +2195,7 @@ class Loop:
     def noise(self, i: int) -> Fraction:
         """Bound on the error of the Q_i that the controller computes."""
         target, own = self.claim.rows[i]["target"], self.claim.measured[i]
-        if isinstance(target, str):
+        if not isinstance(target, int):
             return own
         return own + up(self.half[target][1] * self.noise(target) + self.term_noise(target))
 
@@ -2148,7 +2213,7 @@ class Loop:
 
     def _rows(self) -> None:
         claim, table, n = self.claim, self.table, len(self.claim.rows)
-        values = linear(claim.plant, self.nodes, table)
+        values = linear(joined(claim.plant, self.quotients), self.nodes, table)
         self.mass = [value.range for value in values[:n]]
         if min(mass[0] for mass in self.mass) <= 0:
             raise NotProvedError("an inertia can vanish inside the assumptions")
@@ -2166,24 +2231,30 @@ class Loop:
         self.met: dict[int, tuple[Form, Interval]] = {}
         places = [claim.rest[0], Fraction(0), Fraction(0), Fraction(0)]
         self.resting: dict[str, Interval] = {f"r{k}": (place, place) for k, place in enumerate(places)}
+        rates: list[Form] = []
         for i, row in enumerate(claim.rows):
-            rate = {"r1": ONE} if row["target"] == "reference" else {}
-            rate = self.virtual[row["target"]] if isinstance(row["target"], int) else rate
-            self.closed.append(plus(forces[i], times(rate, neg(self.mass[i]))))
+            target = row["target"]
+            own = {} if isinstance(target, int) else placed(target)
+            parts = [
+                times(moving[k] if k in moving else {"": self.rated.get(k, (ZERO, ZERO))[1]}, (v, v))
+                for k, v in own.items()
+            ]
+            rates.append(self.virtual[target] if isinstance(target, int) else plus({}, *parts))
+            self.closed.append(plus(forces[i], times(rates[i], neg(self.mass[i]))))
             if i in self.gain:
                 self.virtual[i] = table.expand(derivative(self.term[i], self._ranges(), moving))
-            if i in claim.networks:
-                self.disturbance.append(self._demanded(i, raw[i], rate))
-            else:
-                self.disturbance.append(magnitude(self._left(self.closed[i])))
+        places = {i: self._driven(i) for i in claim.networks}
+        left = {place: self._demanded(i, place, raw[place], rates[place]) for i, place in places.items()}
+        for i, form in enumerate(self.closed):
+            self.disturbance.append(left[i] if i in left else magnitude(self._left(form)))
 
     def _left(self, form: Form, known: dict[str, Interval] | None = None) -> Interval:
         """Range of what is neither a deviation nor an input, where some ranges may be known better."""
         left = {s: c for s, c in form.items() if s[:1] not in ("Q", "e")}
         return over(left, {**self.table.ranges, **(known or {})})
 
-    def _demanded(self, i: int, raw: Form, rate: Form) -> Fraction:
-        """What φ*_i meets of row i, and how fast; returns the disturbance that is left.
+    def _demanded(self, i: int, row: int, raw: Form, rate: Form) -> Fraction:
+        """What φ*_i meets of the row that it acts in, and how fast; returns the disturbance that is left.
 
         Only constant coefficients count: those of the force before nonlinear operations are replaced by what bounds
         them, and of those of the target's rate, which may change, their middles.
@@ -2191,22 +2262,22 @@ class Loop:
         claim, table = self.claim, self.table
         place = claim.networks.index(i)
         changes = {f"r{k}": claim.reference[k + 1] for k in range(3)}
-        changes |= {f"w:{name}": change for name, (_, change) in claim.feedforward.items()}
+        changes |= {f"w:{name}": change for name, (_, change) in self.rated.items()}
         centres = {s: down((c[0] + c[1]) / 2) for s, c in rate.items() if s in changes}
         shift = {s: (c, c) for s, c in centres.items()}
-        met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[i])))
+        met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[row])))
         middle = {"": (claim.middle[place], claim.middle[place])}
         level = table.over(plus(met, middle))
         change = magnitude(over(met, changes))
         drive, constant = neg(raw.get(f"p{i}", ZERO)), True
         if not drive[0] > 0:
-            drive, constant = neg(self.closed[i].get(f"p{i}", ZERO)), False
+            drive, constant = neg(self.closed[row].get(f"p{i}", ZERO)), False
         if not drive[0] > 0:
             raise NotProvedError(f"the load network of row {i + 1} has no effect of a known sign")
         known = {*changes, f"p{i}"} if constant else {*changes}
         rest = table.expand({s: c for s, c in raw.items() if s not in known})
         late = plus(rate, times(shift, neg(ONE)))
-        rest = plus(rest, times(late, neg(self.mass[i])), times(middle, neg(ONE)))
+        rest = plus(rest, times(late, neg(self.mass[row])), times(middle, neg(ONE)))
         least = drive[0]
         if not constant:  # where the effect of φ̂ may change, φ* is for its middle
             centre = down((drive[0] + drive[1]) / 2)
@@ -2484,8 +2555,9 @@ class Turn:
             row, target = [ZERO] * (n + q), claim.rows[i]["target"]
             row[i] = (Fraction(1), Fraction(1))
             return (
-                row if isinstance(target, str) else [add(v, neg(w)) for v, w in zip(row, action(target), strict=True)]
-            )
+                [add(v, neg(w)) for v, w in zip(row, action(target), strict=True)]
+                if isinstance(target, int) else row
+            )  # fmt: skip
 
         acts = [[mul(v, _point(s / claim.input_bound[k])) for v, s in zip(action(row), scale, strict=True)]
                 for k, row in enumerate(claim.input_map)]  # fmt: skip
@@ -2498,7 +2570,7 @@ class Turn:
         for i, row in enumerate(claim.rows):
             start, target = [ZERO] * (n + q), row["target"]
             start[i] = _point(Fraction(1))
-            if not isinstance(target, str):
+            if isinstance(target, int):
                 start[target] = mul(neg(loop.gain[target].beta), _point(Fraction(1, 2)))
                 if target in own:
                     start[n + own.index(target)] = _point(Fraction(-1))

@@ -114,9 +114,13 @@ def claim_of(
         data = expression.to_data()  # type: ignore[attr-defined]
         return {"operations": data["operations"], "outputs": data["outputs"]}
 
+    rows = model.to_data()["rows"]
+    for row in rows:
+        if isinstance(row["target"], dict):
+            row["target"] = {name: Fraction(share) for name, share in row["target"].items()}
     return Claim(
         name="",
-        rows=model.to_data()["rows"],
+        rows=rows,
         input_map=list(model.input_map),
         inputs=list(model.inputs),
         plant=program(model.plant),

@@ -120,6 +120,13 @@ def _errors(result: Design, document: dict[str, Any]) -> None:
         f"{late * 1e3:.4g} {unit}{ratio}",
         2,
     )
+    for entry in document["members"]:
+        bounds = zip(entry["model"]["rows"], entry["certificate"]["envelope"]["ultimate"], strict=True)
+        for row, size in bounds:
+            if isinstance(row["target"], dict):  # a mode: what it is in the motion asked for, and how far from it
+                asked = " + ".join(f"{share:g} {name}" for name, share in row["target"].items())
+                size = upward(float(Fraction(size)) * 1e3)
+                _say(f"{row['state']}: certified within {size} m{row['unit']} of {asked}", 4)
     for entry in document["members"] if len(document["members"]) > 1 else []:
         own, plant = shown["members"][entry["name"]], problem.member(entry["name"]).plant
         seen, size = own["largest_error_after_transient"], upward(ultimate_of(entry) * 1e3)

@@ -202,7 +202,7 @@ class RAC:
         errors = []
         for k, i in enumerate(self.controlled):
             target = self.rows[i].target
-            goal = r[0] if target == "reference" else 0 if target == "zero" else virtual[int(target)]
+            goal = virtual[target] if isinstance(target, int) else r[0] if target == "reference" else 0
             errors.append(x[i] - goal)
             first, count = COUNT * k, len(self.controlled)
             proportional = -(gains[first] + gains[first + 1] * z[k]) * errors[-1] / 2

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from ..plants.own import own_name
-from ..problem import Problem
+from ..problem import Member, Problem
 
 
 def assumed(problem: Problem) -> tuple[str, ...]:
@@ -41,13 +41,20 @@ def exact_text(problem: Problem) -> str:
         names = {
             state for m in problem.members
             for state, value in zip(m.plant.states, getattr(m.bounds, kind), strict=True)
-            if value == 0 and not (m.bounds.observer and kind == "noise" and state == m.plant.states[1])
+            if value == 0 and not (kind == "noise" and state in _unmeasured(m))
         }  # fmt: skip
         ordered = [
             state for state in dict.fromkeys(s for m in problem.members for s in m.plant.states) if state in names
         ]
         parts += [f"{', '.join(ordered)} {what}"] if ordered else []
     return f"taken as exact, because the study gives no error: {'; '.join(parts)}" if parts else ""
+
+
+def _unmeasured(member: Member) -> set[str]:
+    """States that the controller does not measure: a speed that it estimates, and a mode that it leaves to itself."""
+    plant = member.plant
+    modes = {s for s, target in zip(plant.states, plant.targets, strict=True) if isinstance(target, Mapping)}
+    return {*modes, plant.states[1]} if member.bounds.observer else modes
 
 
 def _listed(problem: Problem, names: Iterable[str]) -> str:

@@ -39,7 +39,7 @@ def resting_demand(member: Member) -> float | None:
         return None
     loads = [max(member.bounds.disturbances[name].low, member.bounds.disturbances[name].high, key=abs)
              for name in plant.disturbances]  # fmt: skip
-    rest = ca.DM([sum(plant.stroke) / 2 if plant.first == "position" else 0.0, *[0.0] * (len(plant.states) - 1)])
+    rest = ca.DM(plant.standing(loads))
     values = ca.DM([p.value for p in plant.parameters.values()])
     held = plant.demand(row, 0.0, x=ca.SX(rest), w=ca.SX(loads), p=ca.SX(values))
     return abs(float(ca.evalf(ca.SX(held))))

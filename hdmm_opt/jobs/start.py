@@ -102,9 +102,13 @@ def with_bandwidths(member: Member, values: Values, widths: Sequence[float], net
 def _per_gain(member: Member, values: Values) -> list[float]:
     gains = member.gains(values)
     rows = error_rows(member.model, member.bounds, gains, 1e-9 * member.box, np.zeros(len(member.model.inputs)))
-    # no effect at all: an actuator that may be stuck
-    effects = {i: rows.control_gain[i] if rows.control_gain[i] > NOTHING else 1.0 for i in member.law.controlled}
-    return [float(effect / (2 * rows.mass_high[i])) for i, effect in effects.items()]
+    found = []
+    for i in member.law.controlled:
+        row = member.model.driven(i)
+        # no effect at all: an actuator that may be stuck
+        effect = rows.control_gain[i] if rows.control_gain[i] > NOTHING else 1.0
+        found.append(float(effect / (2 * rows.mass_high[row])))
+    return found
 
 
 def starting_point(problem: Problem, progress: Progress) -> Tuned:

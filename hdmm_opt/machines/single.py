@@ -28,15 +28,19 @@ def single(name: str, plant: PlantModel) -> Model:
     """
 
     def check(section: Any) -> Iterator[RefusedKeyError]:
-        yield from no_place(section, _ELSEWHERE, name)
+        yield from no_place(section, (*_ELSEWHERE, *(() if plant.sensors else ("sensor",))), name)
         if section.level not in plant.levels:
             yield RefusedKeyError("level", f"is one of {', '.join(plant.levels)}: got {section.level!r}", "choose one")
+            return
+        if plant.sensors and section.sensor not in plant.sensors:
+            rule = f"is one of {', '.join(plant.sensors)}: got {section.sensor!r}"
+            yield RefusedKeyError("sensor", rule, "say where the sensor is")
             return
         for member in section.joints:
             if member != MEMBER:
                 yield RefusedKeyError(f"joints.{member}", "is not a member of this machine", nearest(member, [MEMBER]))
         known, own = plant.defaults(section.level), section.joints.get(MEMBER)
-        blank = plant.build(section.level, {}, {})
+        blank = plant.made(section, {}, {})
         yield from check_parameters("parameters", section.parameters, known, name, blank)
         yield from check_numbers("", section, blank)
         if own is not None:
@@ -49,7 +53,7 @@ def single(name: str, plant: PlantModel) -> Model:
     def build(section: Any) -> Machine:
         numbers = Numbers.of(section, MEMBER)
         parameters = given(numbers.parameters, plant.defaults(section.level))
-        made = plant.build(section.level, parameters, given(numbers.ratings, plant.ratings(section.level)))
+        made = plant.made(section, parameters, given(numbers.ratings, plant.ratings(section.level)))
         made = numbers_of(made, numbers)
         x = ca.SX.sym("x", 1)
         disturbances = tuple(Disturbance(name=w, unit=made.load_unit, course="any") for w in made.disturbances)

@@ -59,8 +59,9 @@ class Plant:
         input_unit: Unit of the inputs.
         disturbances: Names of the disturbances.
         parameters: Parameters by name.
-        targets: For each state what it tracks: "reference", "zero", or the index of the row whose virtual control
-            is its target.
+        targets: For each state what it tracks: "reference", "zero", the index of the row whose virtual control is its
+            target, or, where the law does not act, coefficients of r0, r1, r2 (reference, its rate, its acceleration),
+            "DISTURBANCE" and "DISTURBANCE/PARAMETER": their sum is the state's value in the motion that is asked for.
         controlled: For each state whether the law acts in its row. Shape (n,).
         input_map: For each input the row whose virtual control it is. Shape (m,).
         x, u, w, p: The symbols (CasADi SX columns) of states, inputs, disturbances and parameters.
@@ -87,7 +88,7 @@ class Plant:
     input_unit: str
     disturbances: tuple[str, ...]
     parameters: Mapping[str, Parameter]
-    targets: tuple[str | int, ...]
+    targets: tuple[str | int | Mapping[str, float], ...]
     controlled: tuple[bool, ...]
     input_map: tuple[int, ...]
     x: Any
@@ -156,25 +157,47 @@ class Plant:
         following = [j for j, target in enumerate(self.targets) if target == i]
         return (self.x[following[0]] if following else self.u[self.input_map.index(i)]), following
 
-    def inertia_over_gain(self, i: int) -> float:
-        """M_i over the effect of what drives row i, at nominal parameters, at rest in the middle of the stroke."""
+    def _driven(self, i: int) -> int:
+        """The row that this acts in: row i, or where that does not read it, the only other one that does."""
         import casadi as ca
 
-        gain = ca.jacobian(self.force[i], self._driver(i)[0])
+        source, following = self._driver(i)
+        reading = [j for j in range(len(self.states)) if j not in following and ca.depends_on(self.force[j], source)]
+        return i if i in reading or len(reading) != 1 else reading[0]
+
+    def standing(self, loads: Sequence[float]) -> list[float]:
+        """The state that rests in the middle of the stroke under some disturbances, at nominal parameters."""
+        values = self.values()
+        acting = dict(zip(self.disturbances, loads, strict=True))
+        acting |= {f"{load}/{name}": w / v for load, w in acting.items() for name, v in values.items() if v}
+        place = sum(self.stroke) / 2 if self.first == "position" else 0.0
+        held = [target if isinstance(target, Mapping) else {} for target in self.targets[1:]]
+        return [place, *(sum(share * acting.get(name, 0.0) for name, share in own.items()) for own in held)]
+
+    def inertia_over_gain(self, i: int) -> float:
+        """M_i over the effect of what drives row i, at nominal parameters, at rest in the middle of the stroke.
+
+        Where that acts in another row, what stands between both moves with it: it is that row's.
+        """
+        import casadi as ca
+
+        row = self._driven(i)
+        gain = ca.jacobian(self.force[row], self._driver(i)[0])
         point = [
             list(self.operating),
             [0.0] * len(self.inputs),
             [0.0] * len(self.disturbances),
             list(self.values().values()),
         ]
-        found = ca.Function("ratio", [self.x, self.u, self.w, self.p], [self.mass[i], gain])(*point)
+        found = ca.Function("ratio", [self.x, self.u, self.w, self.p], [self.mass[row], gain])(*point)
         mass, effect = (abs(float(value)) for value in found)
         return mass / effect if effect > 0 else mass
 
     def demand(self, i: int, rate: Any, *, x: Any, w: Any, p: Any) -> Any:
         """The value of what drives a row that gives ``x_i' = rate``, where h_i is affine in it.
 
-        A row is driven by the state that tracks its virtual control, or where there is none by its input.
+        A row is driven by the state that tracks its virtual control, or where there is none by its input; where that
+        acts in another row, it is that row's rate.
 
         Args:
             i: Row.
@@ -185,9 +208,9 @@ class Plant:
         """
         import casadi as ca
 
-        source, following = self._driver(i)
+        (source, following), row = self._driver(i), self._driven(i)
         without = ca.vertcat(*(0 if j in following[:1] else x[j] for j in range(len(self.states))))
         symbols, values = [self.x, self.u, self.w, self.p], [without, ca.SX.zeros(len(self.inputs)), w, p]
-        gain = ca.jacobian(self.force[i], source)
-        mass, force, gain = ca.substitute([self.mass[i], self.force[i], gain], symbols, values)
+        gain = ca.jacobian(self.force[row], source)
+        mass, force, gain = ca.substitute([self.mass[row], self.force[row], gain], symbols, values)
         return (mass * rate - force) / gain

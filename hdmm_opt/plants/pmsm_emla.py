@@ -25,7 +25,7 @@ from .parameter import EFFECTIVENESS, Parameter
 from .plant import Efforts, Plant
 from .registry import PlantModel
 
-_OUTPUT_UNITS = {"torque": "N m", "current": "A", "power": "W"}
+OUTPUT_UNITS = {"torque": "N m", "current": "A", "power": "W"}
 
 LEVELS = ("torque", "voltage")
 
@@ -78,21 +78,34 @@ def pmsm_emla(
     References:
         Heydari Shahna (2025), publications P-1, P-2 and P-4; Krause et al. (2013), ch. 4, for the dq equations.
 
-    Not guaranteed: backlash, screw and gear compliance, cogging, saturation and thermal effects are not modelled.
+    Not guaranteed: backlash, cogging, saturation and thermal effects are not modelled; screw and gear are rigid, see
+    `elastic_emla`.
     """
     known, motor = {**defaults(level), **(parameters or {})}, {**ratings(level), **(rated or {})}
     return _torque_level(known, motor) if level == "torque" else _voltage_level(known, motor)
 
 
-def _mechanics(v: Any, torque: Any, load: Any, q: Mapping[str, Any]) -> tuple[Any, Any]:
-    """M_2 and h_2."""
+def friction_of(v: Any, q: Mapping[str, Any]) -> Any:
+    """Coulomb friction at the rod, N."""
     import casadi as ca
 
+    return q["coulomb_friction"] * ca.tanh(v / q["friction_speed"])
+
+
+def screw_loss(force: Any, v: Any, q: Mapping[str, Any]) -> Any:
+    """S l: the share of a force that screw and gear need or hold in addition."""
+    import casadi as ca
+
+    direction = ca.tanh(force * v / q["power_scale"])
+    return direction * (q["screw_friction"] / lead_angle_tangent(q) + q["gear_loss"])
+
+
+def _mechanics(v: Any, torque: Any, load: Any, q: Mapping[str, Any]) -> tuple[Any, Any]:
+    """M_2 and h_2."""
     r = transmission(q)
     mass = q["motor_inertia"] / r + r * q["load_mass"]
-    force = load + q["coulomb_friction"] * ca.tanh(v / q["friction_speed"])
-    direction = ca.tanh(force * v / q["power_scale"])
-    loss = direction * (q["screw_friction"] / lead_angle_tangent(q) + q["gear_loss"])
+    force = load + friction_of(v, q)
+    loss = screw_loss(force, v, q)
     driving = torque - q["viscous_friction"] * (v / r) - r * force - r * (loss * force)
     # what is lost stands apart, so that in a proof the rest cancels against the law term by term
     slowed = loss * (r * q["load_mass"] / mass)
@@ -125,7 +138,8 @@ def steady_power(force: Any, speed: Any, values: Mapping[str, Any]) -> Any:
     return torque * (speed / transmission(values)) + 1.5 * values["resistance"] * current**2
 
 
-def _symbols(states: int, inputs: int, known: Mapping[str, Parameter]) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+def symbols(states: int, inputs: int, known: Mapping[str, Parameter]) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+    """Symbols of states, inputs, one load and parameters, and the last by name."""
     import casadi as ca
 
     x, u, w = ca.SX.sym("x", states), ca.SX.sym("u", inputs), ca.SX.sym("w", 1)
@@ -136,7 +150,7 @@ def _symbols(states: int, inputs: int, known: Mapping[str, Parameter]) -> tuple[
 def _torque_level(known: Mapping[str, Parameter], motor: Mapping[str, Parameter]) -> Plant:
     import casadi as ca
 
-    x, u, w, p, q = _symbols(3, 1, known)
+    x, u, w, p, q = symbols(3, 1, known)
     torque = q["torque_scale"] * x[2]
     mass, force = _mechanics(x[1], torque, w[0], q)
     return Plant(
@@ -162,14 +176,14 @@ def _torque_level(known: Mapping[str, Parameter], motor: Mapping[str, Parameter]
             "torque": torque, "current": torque / motor["torque_constant"].value,
             "power": torque * x[1] / transmission(q),
         },
-        output_units=_OUTPUT_UNITS, carried="load_mass",
+        output_units=OUTPUT_UNITS, carried="load_mass",
     )  # fmt: skip
 
 
 def _voltage_level(known: Mapping[str, Parameter], motor: Mapping[str, Parameter]) -> Plant:
     import casadi as ca
 
-    x, u, w, p, q = _symbols(4, 2, known)
+    x, u, w, p, q = symbols(4, 2, known)
     turning = x[1] / transmission(q)
     electrical_speed = q["pole_pairs"] * turning
     torque = q["torque_constant"] * x[2]
@@ -200,7 +214,7 @@ def _voltage_level(known: Mapping[str, Parameter], motor: Mapping[str, Parameter
         stroke=STROKE,
         ratings=motor,
         outputs={"torque": torque, "current": ca.norm_2(x[2:4]), "power": torque * turning},
-        output_units=_OUTPUT_UNITS, carried="load_mass",
+        output_units=OUTPUT_UNITS, carried="load_mass",
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ..discovery import all_offered, offered
 from .parameter import Parameter
@@ -17,14 +18,21 @@ class PlantModel:
     Attributes:
         levels: Input levels that a study chooses from.
         defaults: Level -> parameters with units, tolerances and sources.
-        build: (level, parameters, ratings) -> the plant.
+        build: (level, parameters, ratings) -> the plant; of one with `sensors` (…, sensor=).
         ratings: Level -> numbers that its equations do not read.
+        sensors: Where the sensor may be, for a plant that is not rigid.
     """
 
     levels: tuple[str, ...]
     defaults: Callable[[str], dict[str, Parameter]]
-    build: Callable[[str, Mapping[str, Parameter], Mapping[str, Parameter]], Plant]
+    build: Callable[..., Plant]
     ratings: Callable[[str], dict[str, Parameter]] = lambda level: {}
+    sensors: tuple[str, ...] = ()
+
+    def made(self, section: Any, parameters: Mapping[str, Parameter], ratings: Mapping[str, Parameter]) -> Plant:
+        """The plant of a `[plant]` section with other numbers."""
+        where = {"sensor": section.sensor} if self.sensors else {}
+        return self.build(section.level, parameters, ratings, **where)
 
 
 def plant_model(name: str) -> PlantModel | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from stability.checker import NAME, UNIT_TEXT
@@ -133,7 +134,16 @@ def _check_rows(plant: Plant) -> None:
     if plant.targets[0] != "reference" or not plant.controlled[0]:
         raise _wrong("the first row must track the reference under the law", 'start targets with "reference"')
     for i, target in enumerate(plant.targets):
-        if target not in ("reference", "zero") and not (
+        if isinstance(target, Mapping):
+            quotients = [f"{load}/{name}" for load in plant.disturbances for name in plant.parameters]
+            known = ("r0", "r1", "r2", *plant.disturbances, *quotients)
+            other = next((name for name in target if name not in known), "" if plant.controlled[i] else None)
+            if other is not None:
+                rule = (
+                    f"target {i + 1} is of a row without law, and made of r0, r1, r2, disturbances: got {other!r:.40}"
+                )
+                raise _wrong(rule, "correct it")
+        elif target not in ("reference", "zero") and not (
             isinstance(target, int) and 0 <= target < i and plant.controlled[target]
         ):
             rule = f'target {i + 1} must be "reference", "zero" or a controlled row before it: got {target!r:.20}'

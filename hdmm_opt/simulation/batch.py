@@ -128,8 +128,9 @@ class Batches:
             ]  # fmt: skip
             gains = part.constants(fixed)["gains"]
             reference = np.repeat(r[:, None], lanes, axis=1)
+            acting = self._acting(member.plant.disturbances, scenarios)
             for i in range(1, len(own)):
-                target = self._targets(k, own, reference, gains, load)[i]
+                target = self._targets(k, own, reference, gains, load, acting, part.constants(fixed)["parameters"])[i]
                 own[i] = target + np.clip(-target, -initial[i], initial[i])
             x[part.x] = own
             discrete = part.discrete(z)
@@ -153,18 +154,34 @@ class Batches:
         step, lanes = self._steps[k], x.shape[1]
         return np.array(step.map(lanes)(x, r, z, gains, *(np.tile(v, (lanes, 1)).T for v in (nominal, list(load))))[0])
 
-    def _targets(self, k: int, x: Array, r: Array, gains: Array, load: Sequence[float]) -> Array:
+    def _acting(self, names: Sequence[str], scenarios: Sequence[Scenario]) -> Array:
+        """The disturbances of a member at the first instant, the middles of those that jump; zero for a coupling's.
+
+        Shape (w, lanes).
+        """
+        own = {d.name for d in self.problem.machine.disturbances}
+        found = np.zeros((len(names), len(scenarios)))
+        for k, name in enumerate(names):
+            for lane, scenario in enumerate(scenarios if name in own else ()):
+                middle = self._middle(name)
+                course = middle if self.problem.rate_of(name) is None else scenario.disturbances.get(name, middle)
+                found[k, lane] = course_at(course, np.zeros(1))[0]
+        return found
+
+    def _targets(
+        self, k: int, x: Array, r: Array, gains: Array, load: Sequence[float], acting: Array, p: Array
+    ) -> Array:
         """What each state of a member tracks; nothing but the reference where its law is a rival. Shape (n, lanes)."""
         member = self.problem.members[k]
         if self.parts[k].law is not member.law:
             gains = np.repeat(np.array([[item.low for item in member.ranges]]).T, x.shape[1], axis=1)
         if k not in self._goals:
             self._goals[k] = _targets_of(member.law)
-        return np.array(self._goals[k](x, r, gains, load))
+        return np.array(self._goals[k](x, r, gains, load, acting, p))
 
 
 def _targets_of(law: Any) -> Any:
-    """CasADi function (x, r, gains, load) -> target of each row; adaptive scalars at zero, networks at the preload."""
+    """CasADi function (x, r, gains, load, what acts, p) -> target of each row; θ̂ at zero, networks at the preload."""
     import casadi as ca
 
     plant = law.plant
@@ -173,8 +190,15 @@ def _targets_of(law: Any) -> Any:
     nominal = ca.DM(list(plant.values().values()))
     start = ca.vertcat(*law.start([0.0] * len(plant.states), ca.vertsplit(gains)))
     virtual, _ = law.virtual_controls(x, r, start, gains, nominal, load)
-    goals = [r[0] if t == "reference" else 0 if t == "zero" else virtual[int(t)] for t in plant.targets]
-    return ca.Function("targets", [x, r, gains, load], [ca.vertcat(*goals)])
+    acting, p = ca.SX.sym("acting", plant.w.numel()), ca.SX.sym("p", plant.p.numel())
+    signals = {f"r{k}": r[k] for k in range(3)} | {name: acting[k] for k, name in enumerate(plant.disturbances)}
+    signals |= {f"{load}/{name}": acting[k] / p[j] for k, load in enumerate(plant.disturbances)
+                for j, name in enumerate(plant.parameters)}  # fmt: skip
+    goals = [
+        virtual[row.target] if isinstance(row.target, int)
+        else sum((share * signals[name] for name, share in row.place.items()), ca.SX(0)) for row in law.rows
+    ]  # fmt: skip
+    return ca.Function("targets", [x, r, gains, load, acting, p], [ca.vertcat(*goals)])
 
 
 def seed_of(seed: int) -> int:

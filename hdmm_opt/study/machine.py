@@ -39,6 +39,7 @@ class PlantSection(NumberSection):
 
     model: str
     level: str | None = None
+    sensor: str | None = None
     urdf: str | None = None
     tip_m: tuple[float, float, float] | None = None
     damping: NonNegative | None = None

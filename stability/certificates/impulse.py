@@ -30,7 +30,7 @@ from ..loops.responses import Responses, responses
 from ..loops.stack import MAX_DELAY, Controller, Stack, controller, delay_of, wiring
 from ..loops.turn import turn
 from .certificate import Certificate, Failure
-from .small_gain import Cell, Cut, cell_of, cells_of, closed, cut_for, late_of, middle_of, small_gain
+from .small_gain import CALM, Cell, Cut, cell_of, cells_of, closed, cut_for, late_of, middle_of, small_gain
 
 Array = NDArray[np.float64]
 
@@ -102,7 +102,7 @@ def begun(
     if not 0 <= bounds.jitter <= min(bounds.delay, 0.499 * bounds.period):
         return Failure(reason="the jitter of a delay is at most the delay, and less than half a period")
     try:
-        return Search(model, bounds, gains, limit, cut_for(len(model.rows), fine=fine))
+        return Search(model, bounds, gains, limit, cut_for(len(model.rows), ringing=model.rings, fine=fine))
     except np.linalg.LinAlgError:
         return Failure(reason="the loop has no coordinates in which a period contracts")
     except UnboundedError as error:
@@ -142,10 +142,18 @@ class Search:
         self.steering, self.direct = wiring(model, self.own)
         start = rounded(np.maximum(np.array(bounds.initial), NOTHING * limit))
         self.bounds, (self.box, self.rows) = bounds, first_box(model, bounds, gains, start)
-        self.split = cut.of(self.rows)
+        self.split = (1,) * len(model.rows)
         self.force = np.array([rounded(row) for row in (self.rows.low + self.rows.high) / 2])
         self.drive = np.array([rounded(row) for row in (self.rows.input_low + self.rows.input_high) / 2])
+        self.split = cut.of(self.rows, self._ringing(bounds))
         self.responses = self._responses(self.rows, bounds)
+
+    def _ringing(self, bounds: Bounds) -> Array | float:
+        """How much longer rows ring than those of a loop that does not, where the law leaves a mode to itself."""
+        if not self.model.rings:
+            return 1.0
+        (whole,), n = self._responses(self.rows, bounds), len(self.model.rows)
+        return 1.0 if whole is None else np.maximum(1.0, np.diag(whole.plain.rest[n : 2 * n]) / CALM)
 
     def _responses(self, rows: DeviationRows, bounds: Bounds) -> list[Responses | None]:
         return [responses(self._stack(part, bounds)) for part in cells_of(rows, self.split)]

@@ -37,9 +37,9 @@ class Cut:
     cells: int
     more: int
 
-    def of(self, rows: DeviationRows) -> tuple[int, ...]:
-        """Number of parts of each range."""
-        wide = np.log(rows.mass_high / rows.mass_low) / 2
+    def of(self, rows: DeviationRows, ringing: Array | float = 1.0) -> tuple[int, ...]:
+        """Number of parts of each range, where what a part leaves uncertain counts `ringing` times. Shape (n,)."""
+        wide = np.log(rows.mass_high / rows.mass_low) / 2 * ringing
         counts = np.clip(np.ceil(wide / self.width), 1, self.most)
         while counts.prod() > self.cells:
             after = np.where(counts > 1, wide / np.maximum(counts - 1, 1), np.inf)
@@ -49,14 +49,20 @@ class Cut:
         return tuple(int(v) for v in counts)
 
 
+#: What a push makes of the rate of its own row in a loop that does not ring, over the push, is at most this.
+CALM = 2.5
 #: Half of a part's width, as a share of its middle, that is wide for a refined certificate.
 WIDE = 0.06
 #: For candidates of a search; for a certificate that is refined, and with more rows, of which the checker takes less.
 COARSE, FINE, FEWER, MANY = Cut(0.1, 4, 4, 4), Cut(0.008, 12, 12, 24), Cut(0.008, 12, 8, 8), 4
+#: The same of a loop with a mode that the law leaves to itself.
+RINGING = Cut(0.1, 8, 8, 8), Cut(0.008, 10, 10, 10)
 
 
-def cut_for(rows: int, *, fine: bool) -> Cut:
+def cut_for(rows: int, *, ringing: bool, fine: bool) -> Cut:
     """How a loop of so many rows is cut."""
+    if ringing:
+        return RINGING[fine]
     if not fine:
         return COARSE
     return FEWER if rows > MANY else FINE

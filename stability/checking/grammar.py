@@ -69,7 +69,7 @@ STUDY = entry_of(
         "plant": entry_of(
             {"model": text, "parameters": NOTHING, "ratings": NOTHING, "limits": NOTHING,
              "joints": named(DRIVE, MAX_MEMBERS), "locked": named(plain_number)},
-            {"level": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
+            {"level": name, "sensor": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
         ),
         "uncertainty": entry_of({
             "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit},

@@ -7,12 +7,31 @@ more noise, a demand that a network cannot meet.
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Any
 
 from .arithmetic import ONE, ZERO, Interval, add, down, inverse, magnitude, mul, neg, symmetric, up
 from .claim import Claim, Gain
 from .forms import Form, Node, Table, derivative, linear, over, plus, times
 from .limits import VARYING, NotProvedError, need
 from .parsing import reads
+
+
+def placed(target: Any) -> dict[str, Fraction]:
+    """Coefficients of the signals whose sum is the target of a row that follows no other."""
+    if isinstance(target, dict):
+        return target
+    return {"r0": Fraction(1)} if target == "reference" else {}
+
+
+def joined(program: dict[str, Any], names: set[str]) -> dict[str, Any]:
+    """An operation list with the quotients of two inputs that are named "A/B" as inputs of their own."""
+    operations = program["operations"]
+    read = {k: operation[1] for k, operation in enumerate(operations) if operation[0] == "input"}
+    made = []
+    for operation in operations:
+        name = "/".join(str(read.get(k, "")) for k in operation[1:]) if operation[0] == "div" else ""
+        made.append(["input", name] if name in names else operation)
+    return {**program, "operations": made}
 
 
 class Loop:
@@ -23,7 +42,7 @@ class Loop:
     """
 
     def __init__(self, claim: Claim, inflate: Fraction) -> None:
-        tracked = {row["target"] for row in claim.rows}
+        tracked = {row["target"] for row in claim.rows if isinstance(row["target"], int)}
         states = {row["state"] for row in claim.rows}
         for i, term in zip(claim.controlled, claim.law, strict=True):
             need(i not in tracked or not states & reads(term), "the modelling term of a tracked row reads a state")
@@ -51,6 +70,11 @@ class Loop:
             if name not in claim.nominal:
                 self._name(f"nominal.{name}", {f"w:{name}": ONE})
             self._name(name, plus({f"w:{name}": ONE}, self.nodes[name].form))
+        self.rated, self.quotients = dict(claim.feedforward), set()
+        for row in claim.rows:
+            for name in placed(row["target"]):
+                if "/" in name and name not in self.quotients:
+                    self._quotient(name, *name.split("/", 1))
         for k, bounds in enumerate(claim.reference):
             table.ranges[f"r{k}"] = bounds
             self._name(f"r{k}", {f"r{k}": ONE})
@@ -66,6 +90,18 @@ class Loop:
             self._control(i)
         for k, (name, row) in enumerate(zip(claim.inputs, claim.input_map, strict=True)):
             self._name(name, plus(self.kappa(row), {f"e{k}": ONE}))
+
+    def _quotient(self, name: str, load: str, parameter: str) -> None:
+        """A disturbance of bounded rate over a constant, which is another one."""
+        claim = self.claim
+        known = load in claim.feedforward and parameter in claim.parameters and parameter != VARYING
+        need(known, "a target divides a disturbance of bounded rate by a constant")
+        by = inverse(claim.parameters[parameter])
+        span, rate = (mul(part, by) for part in claim.feedforward[load])
+        self.quotients.add(name)
+        self.rated[name], self.table.ranges[f"w:{name}"] = (span, rate), span
+        self._stated(name, mul(claim.disturbances[load], by), changing=True)
+        self._name(name, plus({f"w:{name}": ONE}, self.nodes[name].form))
 
     def _name(self, name: str, form: Form) -> None:
         self.nodes[name] = Node(self.table.key("input", name), form, self.table.over(form))
@@ -83,9 +119,29 @@ class Loop:
     def target(self, i: int) -> Form:
         """The operating value of state i."""
         target = self.claim.rows[i]["target"]
-        if target == "reference":
-            return {"r0": ONE}
-        return {} if target == "zero" else self.kappa(target)
+        if isinstance(target, int):
+            return self.kappa(target)
+        return plus({}, *(times(self._signal(name), (share, share)) for name, share in placed(target).items()))
+
+    def _signal(self, name: str) -> Form:
+        """A derivative of the reference; or a disturbance, its middle where its rate has no bound."""
+        if name in ("r0", "r1", "r2"):
+            return {name: ONE}
+        if name in self.rated:
+            return {f"w:{name}": ONE}
+        need(name in self.nodes and name != "r3", "what a row tracks is made of r0, r1, r2 and disturbances")
+        low, high = self.nodes[name].range
+        middle = down((low + high) / 2)
+        return {"": (middle, middle)}
+
+    def _driven(self, i: int) -> int:
+        """The row that what carries out κ_i acts in: row i, or where that does not read it, the only one that does."""
+        claim, n = self.claim, len(self.claim.rows)
+        found = [row["state"] for row in claim.rows if row["target"] == i]
+        follower = found[0] if found else claim.inputs[claim.input_map.index(i)]
+        read = [reads(claim.plant, [claim.plant["outputs"][n + j]]) for j in range(n)]
+        reading = [j for j, row in enumerate(claim.rows) if row["state"] != follower and follower in read[j]]
+        return i if i in reading or len(reading) != 1 else reading[0]
 
     def kappa(self, i: int) -> Form:
         """The operating value of row i's control: m_i, less φ*_i where it has a network."""
@@ -105,7 +161,7 @@ class Loop:
     def _error(self, i: int) -> Fraction:
         """Bound on |Q_i|: z_i, what its target asks for, and what its network misses."""
         claim, target = self.claim, self.claim.rows[i]["target"]
-        if isinstance(target, str):
+        if not isinstance(target, int):
             return claim.half_widths[i]
         missed = claim.network_bound[claim.networks.index(target)] if target in claim.networks else Fraction(0)
         return claim.half_widths[i] + self.half[target][1] * self._error(target) + missed
@@ -113,7 +169,7 @@ class Loop:
     def noise(self, i: int) -> Fraction:
         """Bound on the error of the Q_i that the controller computes."""
         target, own = self.claim.rows[i]["target"], self.claim.measured[i]
-        if isinstance(target, str):
+        if not isinstance(target, int):
             return own
         return own + up(self.half[target][1] * self.noise(target) + self.term_noise(target))
 
@@ -131,7 +187,7 @@ class Loop:
 
     def _rows(self) -> None:
         claim, table, n = self.claim, self.table, len(self.claim.rows)
-        values = linear(claim.plant, self.nodes, table)
+        values = linear(joined(claim.plant, self.quotients), self.nodes, table)
         self.mass = [value.range for value in values[:n]]
         if min(mass[0] for mass in self.mass) <= 0:
             raise NotProvedError("an inertia can vanish inside the assumptions")
@@ -149,24 +205,30 @@ class Loop:
         self.met: dict[int, tuple[Form, Interval]] = {}
         places = [claim.rest[0], Fraction(0), Fraction(0), Fraction(0)]
         self.resting: dict[str, Interval] = {f"r{k}": (place, place) for k, place in enumerate(places)}
+        rates: list[Form] = []
         for i, row in enumerate(claim.rows):
-            rate = {"r1": ONE} if row["target"] == "reference" else {}
-            rate = self.virtual[row["target"]] if isinstance(row["target"], int) else rate
-            self.closed.append(plus(forces[i], times(rate, neg(self.mass[i]))))
+            target = row["target"]
+            own = {} if isinstance(target, int) else placed(target)
+            parts = [
+                times(moving[k] if k in moving else {"": self.rated.get(k, (ZERO, ZERO))[1]}, (v, v))
+                for k, v in own.items()
+            ]
+            rates.append(self.virtual[target] if isinstance(target, int) else plus({}, *parts))
+            self.closed.append(plus(forces[i], times(rates[i], neg(self.mass[i]))))
             if i in self.gain:
                 self.virtual[i] = table.expand(derivative(self.term[i], self._ranges(), moving))
-            if i in claim.networks:
-                self.disturbance.append(self._demanded(i, raw[i], rate))
-            else:
-                self.disturbance.append(magnitude(self._left(self.closed[i])))
+        places = {i: self._driven(i) for i in claim.networks}
+        left = {place: self._demanded(i, place, raw[place], rates[place]) for i, place in places.items()}
+        for i, form in enumerate(self.closed):
+            self.disturbance.append(left[i] if i in left else magnitude(self._left(form)))
 
     def _left(self, form: Form, known: dict[str, Interval] | None = None) -> Interval:
         """Range of what is neither a deviation nor an input, where some ranges may be known better."""
         left = {s: c for s, c in form.items() if s[:1] not in ("Q", "e")}
         return over(left, {**self.table.ranges, **(known or {})})
 
-    def _demanded(self, i: int, raw: Form, rate: Form) -> Fraction:
-        """What φ*_i meets of row i, and how fast; returns the disturbance that is left.
+    def _demanded(self, i: int, row: int, raw: Form, rate: Form) -> Fraction:
+        """What φ*_i meets of the row that it acts in, and how fast; returns the disturbance that is left.
 
         Only constant coefficients count: those of the force before nonlinear operations are replaced by what bounds
         them, and of those of the target's rate, which may change, their middles.
@@ -174,22 +236,22 @@ class Loop:
         claim, table = self.claim, self.table
         place = claim.networks.index(i)
         changes = {f"r{k}": claim.reference[k + 1] for k in range(3)}
-        changes |= {f"w:{name}": change for name, (_, change) in claim.feedforward.items()}
+        changes |= {f"w:{name}": change for name, (_, change) in self.rated.items()}
         centres = {s: down((c[0] + c[1]) / 2) for s, c in rate.items() if s in changes}
         shift = {s: (c, c) for s, c in centres.items()}
-        met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[i])))
+        met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[row])))
         middle = {"": (claim.middle[place], claim.middle[place])}
         level = table.over(plus(met, middle))
         change = magnitude(over(met, changes))
         drive, constant = neg(raw.get(f"p{i}", ZERO)), True
         if not drive[0] > 0:
-            drive, constant = neg(self.closed[i].get(f"p{i}", ZERO)), False
+            drive, constant = neg(self.closed[row].get(f"p{i}", ZERO)), False
         if not drive[0] > 0:
             raise NotProvedError(f"the load network of row {i + 1} has no effect of a known sign")
         known = {*changes, f"p{i}"} if constant else {*changes}
         rest = table.expand({s: c for s, c in raw.items() if s not in known})
         late = plus(rate, times(shift, neg(ONE)))
-        rest = plus(rest, times(late, neg(self.mass[i])), times(middle, neg(ONE)))
+        rest = plus(rest, times(late, neg(self.mass[row])), times(middle, neg(ONE)))
         least = drive[0]
         if not constant:  # where the effect of φ̂ may change, φ* is for its middle
             centre = down((drive[0] + drive[1]) / 2)

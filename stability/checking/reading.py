@@ -131,7 +131,10 @@ def rows_of(model: dict[str, Any]) -> tuple[list[dict[str, Any]], list[int], lis
     need(1 <= n <= MAX_ROWS and 1 <= m <= n, f"1 to {MAX_ROWS} rows are needed: got {n}")
     for i, row in enumerate(rows):
         target = row["target"]
-        if target not in ("reference", "zero"):
+        if isinstance(target, dict):
+            need(row["controlled"] is False, "a row under the law tracks the reference, zero, or a row")
+            row["target"] = {name: number(share, "a row's target") for name, share in target.items()}
+        elif target not in ("reference", "zero"):
             row["target"] = index(target, i, "a row's target")
             need(rows[row["target"]]["controlled"] is True, "a row's target must be a controlled row")
         need(

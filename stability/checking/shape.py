@@ -125,7 +125,13 @@ def unit(value: Any, where: str) -> None:
 
 def target(value: Any, where: str) -> None:
     """What a row tracks."""
-    if not isinstance(value, Fraction):
+    if isinstance(value, dict):
+        need(len(value) <= 8, f"{where} has at most 8 signals")
+        for key, share in value.items():
+            for part in key.split("/", 1):
+                name(part, where)
+            plain_number(share, where)
+    elif not isinstance(value, Fraction):
         some("reference", "zero")(value, where)
 
 

@@ -20,9 +20,10 @@ def well_formed(claim: Claim) -> None:
     units = {row["state"]: row["unit"] for row in claim.rows}
     for limit in claim.limits[1:]:
         alike = {state for state, unit in units.items() if unit == limit["unit"]}
-        need(
-            set(limit["signals"]) == alike, f"the limit on {limit['name']} must be about every state in {limit['unit']}"
-        )
+        limited = {
+            signal for other in claim.limits[1:] if other["unit"] == limit["unit"] for signal in other["signals"]
+        }
+        need(limited == alike, f"the limits in {limit['unit']} must be about every state in {limit['unit']}")
 
 
 def _kinematic(claim: Claim) -> None:

@@ -95,8 +95,9 @@ class Turn:
             row, target = [ZERO] * (n + q), claim.rows[i]["target"]
             row[i] = (Fraction(1), Fraction(1))
             return (
-                row if isinstance(target, str) else [add(v, neg(w)) for v, w in zip(row, action(target), strict=True)]
-            )
+                [add(v, neg(w)) for v, w in zip(row, action(target), strict=True)]
+                if isinstance(target, int) else row
+            )  # fmt: skip
 
         acts = [[mul(v, _point(s / claim.input_bound[k])) for v, s in zip(action(row), scale, strict=True)]
                 for k, row in enumerate(claim.input_map)]  # fmt: skip
@@ -109,7 +110,7 @@ class Turn:
         for i, row in enumerate(claim.rows):
             start, target = [ZERO] * (n + q), row["target"]
             start[i] = _point(Fraction(1))
-            if not isinstance(target, str):
+            if isinstance(target, int):
                 start[target] = mul(neg(loop.gain[target].beta), _point(Fraction(1, 2)))
                 if target in own:
                     start[n + own.index(target)] = _point(Fraction(-1))

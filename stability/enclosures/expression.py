@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from .interval import Interval
@@ -34,6 +34,29 @@ class Expression:
             "operations": [list(operation) for operation in self.operations],
             "outputs": list(self.outputs),
         }
+
+    def reads(self, output: int) -> set[str]:
+        """Names of the inputs that an entry depends on."""
+        seen, fresh, found = {output}, [output], set()
+        while fresh:
+            operator, *arguments = self.operations[fresh.pop()]
+            if operator == "input":
+                found.add(arguments[0])
+            elif operator != "const":
+                fresh += [index for index in arguments if index not in seen]
+                seen.update(arguments)
+        return found
+
+    def joined(self, names: Sequence[str]) -> Expression:
+        """The program with the quotients of two inputs that are named "A/B" as inputs of their own."""
+        if not names:
+            return self
+        read = {k: operation[1] for k, operation in enumerate(self.operations) if operation[0] == "input"}
+        made = []
+        for operation in self.operations:
+            name = "/".join(str(read.get(k, "")) for k in operation[1:]) if operation[0] == "div" else ""
+            made.append(("input", name) if name in names else operation)
+        return replace(self, inputs=(*self.inputs, *names), operations=tuple(made))
 
     def __call__(self, values: Mapping[str, float]) -> list[float]:
         """Evaluate in floats.

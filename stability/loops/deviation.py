@@ -5,8 +5,8 @@ r0, zero, or m_j - φ*_j of the row j that x_i answers to. With z = x - x*, c = 
 
     M_i z_i' = sum_j J_ij z_j + sum_k B_ik v_k + d_i + M_i φ*_j',      Q_i = z_i + b_j Q_j + c_j,      v = -b Q - c
 
-where j is the row that row i tracks. In a row with a network φ* is what the constant coefficients of h_i make of
-signals of bounded rate, and a constant; what is left, and what has no bounded rate, is d. Products and tanh are
+where j is the row that row i tracks. In the row that a network acts in φ* is what the constant coefficients of h make
+of signals of bounded rate, and a constant; what is left, and what has no bounded rate, is d. Products and tanh are
 enclosed as in `form.py`; what plant and law share cancels.
 """
 
@@ -136,7 +136,7 @@ class _Builder(Builder):
 
     def _error(self, i: int) -> float:
         target = self.model.rows[i].target
-        if isinstance(target, str):
+        if not isinstance(target, int):
             return self.half_widths[i]
         upstream = self.half_gain[target].high * self._error(target)
         if target in self.networks:
@@ -160,8 +160,10 @@ class _Builder(Builder):
         rows, term_rates = self._rows(
             forces, masses, [f.scaled(ONE / mass) for f, mass in zip(forces, masses, strict=True)]
         )
-        demands = {i: self._demand(i, raw[i], rows[i], masses[i], term_rates) for i in self.networks}
-        left = [demands[i].rest if i in demands else self._disturbance(row, "Qe") for i, row in enumerate(rows)]
+        places = {i: self.model.driven(i) for i in self.networks}
+        demands = {i: self._demand(i, raw[k], rows[k], masses[k], self.target_rate[k]) for i, k in places.items()}
+        rest = {places[i]: demand.rest for i, demand in demands.items()}
+        left = [rest[k] if k in rest else self._disturbance(row, "Qe") for k, row in enumerate(rows)]
         halves = [self.half_gain[i] * ROUNDED for i in self.model.controlled]
         inputs = self.model.input_map
         return DeviationRows(
@@ -186,14 +188,13 @@ class _Builder(Builder):
             lean=np.array([d.lean for d in demands.values()]), measured=np.array(self.bounds.noise),
         )  # fmt: skip
 
-    def _demand(self, i: int, raw: Form, row: Form, mass: Interval, term_rates: dict[int, Form]) -> _Demand:
-        """Split row i into what φ*_i meets and what is left.
+    def _demand(self, i: int, raw: Form, row: Form, mass: Interval, moving: Form) -> _Demand:
+        """Split the row that φ̂_i acts in into what φ*_i meets and what is left; `moving` is the rate of its target.
 
         Only constant coefficients count: those of the force before nonlinear operations are replaced by what bounds
         them, and of those of the target's rate, which may change, their middles.
         """
-        rates, target = self._rates_of_signals(), self.model.rows[i].target
-        moving = term_rates[target] if isinstance(target, int) else Form.of("r1") if target == "reference" else Form()
+        rates = self._rates_of_signals()
         shift = {s: Interval((c.low + c.high) / 2) for s, c in moving.coefficients.items() if s in rates}
         own = {s: c for s, c in raw.coefficients.items() if s in rates}
         met = Form(own) - Form(shift).scaled(mass)
@@ -241,5 +242,5 @@ class _Builder(Builder):
         """Rate of each signal whose rate is bounded."""
         ranges = self.bounds.reference
         return {f"r{k}": ranges[k + 1] for k in range(3)} | {
-            f"w:{name}": rate for name, (_, rate) in self.bounds.feedforward.items()
+            f"w:{name}": rate for name, (_, rate) in self.rated.items()
         }

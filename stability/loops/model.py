@@ -10,6 +10,9 @@ from ..enclosures.expression import Expression
 from ..enclosures.interval import Interval
 from .observer import Observer
 
+#: What rows track that follow no other row, as sums of signals.
+ALONE: Mapping[str, Mapping[str, float]] = {"reference": {"r0": 1.0}, "zero": {}}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
@@ -18,14 +21,23 @@ class Row:
     Attributes:
         state: Name of its state.
         unit: Unit of its state.
-        target: "reference" (r0), "zero", or the index of the row whose virtual control is the target.
+        target: "reference" (r0), "zero", the index of the row whose virtual control is the target, or, where the law
+            does not act, coefficients of r0, r1, r2, "DISTURBANCE" and "DISTURBANCE/PARAMETER": their sum is the value
+            of the state in the motion that is asked for.
         controlled: True where the RAC law acts in this row; False for an actuator lag.
     """
 
     state: str
     unit: str
-    target: str | int
+    target: str | int | Mapping[str, float]
     controlled: bool
+
+    @property
+    def place(self) -> Mapping[str, float]:
+        """Coefficients of the signals whose sum is the target; none where a row follows another."""
+        if isinstance(self.target, int):
+            return {}
+        return ALONE[self.target] if isinstance(self.target, str) else self.target
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,11 +63,38 @@ class LoopModel:
         """Indices of the rows that carry gains."""
         return tuple(i for i, row in enumerate(self.rows) if row.controlled)
 
+    @property
+    def rings(self) -> bool:
+        """Whether there is a mode that the law leaves to itself: states that follow no row and no law."""
+        return any(row.place and not row.controlled for row in self.rows)
+
+    @property
+    def quotients(self) -> list[str]:
+        """Names "DISTURBANCE/PARAMETER" in targets: the plant's divisions of both are these signals, too."""
+        return sorted({name for row in self.rows for name in row.place if "/" in name})
+
+    def driven(self, i: int) -> int:
+        """The row that what carries out κ_i acts in: row i, or where that does not read it, the only one that does."""
+        follower = next((row.state for row in self.rows if row.target == i), None)
+        follower = self.inputs[self.input_map.index(i)] if follower is None else follower
+        n = len(self.rows)
+        reading = [
+            j for j, row in enumerate(self.rows)
+            if row.state != follower and follower in self.plant.reads(self.plant.outputs[n + j])
+        ]  # fmt: skip
+        return i if i in reading or len(reading) != 1 else reading[0]
+
     def to_data(self) -> dict[str, Any]:
         """The model as JSON data."""
         return {
             "rows": [
-                {"state": r.state, "unit": r.unit, "target": r.target, "controlled": r.controlled} for r in self.rows
+                {
+                    "state": r.state,
+                    "unit": r.unit,
+                    "controlled": r.controlled,
+                    "target": dict(r.target) if isinstance(r.target, Mapping) else r.target,
+                }
+                for r in self.rows
             ],
             "input_map": list(self.input_map),
             "inputs": list(self.inputs),

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 #: A parameter that may change in a run: faults take effectiveness.
 VARYING = "effectiveness"
+#: Range and rate of what is not there.
+STILL = (Interval(0.0), Interval(0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +111,9 @@ class Builder:
                 self.inputs[f"nominal.{name}"] = self.symbols.value(f"nominal.{name}", Form.of(symbol))
             beside = Form.of(symbol) + self._changing(name, bounds.disturbances[name]).form
             self.inputs[name] = self.symbols.value(name, beside)
+        self.rated = {**bounds.feedforward}
+        for name in model.quotients:
+            self._quotient(name, *name.split("/"))
         for k in range(4):
             self.inputs[f"r{k}"] = self.symbols.value(f"r{k}", Form.of(f"r{k}"))
         self.noise: dict[int, float] = {}
@@ -116,6 +121,16 @@ class Builder:
         self.theta_rate: dict[int, float] = {}
         self.half_gain: dict[int, Interval] = {}
         self.model_term: dict[int, Form] = {}
+
+    def _quotient(self, name: str, load: str, parameter: str) -> None:
+        """A disturbance of bounded rate over a constant, which is another one."""
+        if parameter == VARYING or load not in self.bounds.feedforward:
+            raise ValueError(f"a state that follows {name} needs a bound on the rate of {load}")
+        by = ONE / self.bounds.parameters[parameter]
+        span, rate = (part * by for part in self.bounds.feedforward[load])
+        self.rated[name], self.symbols.ranges[f"w:{name}"] = (span, rate), span
+        beside = self._changing(name, self.bounds.disturbances[load] * by)
+        self.inputs[name] = self.symbols.value(name, Form.of(f"w:{name}") + beside.form)
 
     def _fixed(self, name: str, interval: Interval) -> Value:
         return self.symbols.constant(interval, name)
@@ -162,13 +177,25 @@ class Builder:
             self._virtual_control(i)
 
     def _target(self, i: int) -> Form:
-        target = self.model.rows[i].target
-        if target == "reference":
-            return Form.of("r0")
-        if target == "zero":
-            return Form()
-        self._virtual_control(int(target))
-        return self._control(int(target))
+        row = self.model.rows[i]
+        if isinstance(row.target, int):
+            self._virtual_control(row.target)
+            return self._control(row.target)
+        found = Form()
+        for name, share in row.place.items():
+            found = found + self._signal(name).scaled(Interval(share))
+        return found
+
+    def _signal(self, name: str) -> Form:
+        """A derivative of the reference; or a disturbance, its middle where its rate has no bound."""
+        if name in ("r0", "r1", "r2"):
+            return Form.of(name)
+        if name in self.rated:
+            return Form.of(f"w:{name}")
+        if name not in self.inputs or name == "r3":
+            raise ValueError(f"a target is made of r0, r1, r2 and disturbances: got {name}")
+        span = self.inputs[name].range
+        return Form(constant=Interval((span.low + span.high) / 2))
 
     def _virtual_control(self, i: int) -> None:
         """Bounds on θ̂_i, the gain interval [½β, ½B], the symbol K_i and the modelling term m_i."""
@@ -194,7 +221,7 @@ class Builder:
         """Bound on the error of the Q_i that the controller computes."""
         target = self.model.rows[i].target
         own = self.bounds.noise[i]
-        if isinstance(target, str):
+        if not isinstance(target, int):
             self.noise[i] = own
             return own
         self.noise[i] = (own + self._control_noise(target)) * (1 + 1e-12)
@@ -223,7 +250,7 @@ class Builder:
         for k, (name, row) in enumerate(zip(self.model.inputs, self.model.input_map, strict=True)):
             form = self._control(row) + Form.of(f"e{k}")
             self.inputs[name] = self.symbols.value(name, form)
-        return evaluate(self.model.plant, self.inputs, self.symbols)
+        return evaluate(self.model.plant.joined(self.model.quotients), self.inputs, self.symbols)
 
     def _rows(
         self, forces: list[Form], masses: list[Interval], rates: list[Form]
@@ -234,10 +261,13 @@ class Builder:
         ranges = self._ranges()
         rows: list[Form] = []
         virtual: dict[int, Form] = {}
+        self.target_rate: list[Form] = []
         for i, row in enumerate(self.model.rows):
-            target_rate = Form.of("r1") if row.target == "reference" else Form()
-            if isinstance(row.target, int):
-                target_rate = virtual[row.target]
+            target_rate = virtual[row.target] if isinstance(row.target, int) else Form()
+            for name, share in row.place.items():
+                rate = tangents[name] if name in tangents else Form(constant=self.rated.get(name, STILL)[1])
+                target_rate = target_rate + rate.scaled(Interval(share))
+            self.target_rate.append(target_rate)
             rows.append(forces[i] - target_rate.scaled(masses[i]))
             if i in self.gains:
                 term_rate = self.symbols.expand(tangent(self.terms[i], ranges, tangents), keep="K")
