@@ -19,23 +19,29 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("study")
 @click.option("-o", "output", type=click.Path(path_type=Path), help="JSON file for gains and figures of all.")
+@click.option("--report", type=click.Path(path_type=Path, file_okay=False), help="Folder for an HTML page.")
 @SEED
 @JOBS
 @BUDGET
 @ALLOW_CODE
 @QUIET_OPTION
-def command(study: str, output: Path | None, seed: int | None, jobs: int, budget: str, allow_code: bool) -> None:
+def command(
+    study: str, output: Path | None, report: Path | None, seed: int | None, jobs: int, budget: str, allow_code: bool
+) -> None:
     """Compare the law with its rivals on STUDY: equal tuning budget, same scenarios, same knowledge of the plant."""
-    sys.exit(run(study, output, options_of(jobs, None, seed, False, budget), allow_code))
+    sys.exit(run(study, output, report, options_of(jobs, None, seed, False, budget), allow_code))
 
 
-def run(name: str, output: Path | None, options: Options, allow_code: bool) -> int:
+def run(name: str, output: Path | None, report: Path | None, options: Options, allow_code: bool) -> int:
     """Tune all, run all, show the table."""
+    from ..files.comparison import COMPARISON_NAME, write_comparison
+    from ..files.report import check_report
     from ..files.seal import to_text
     from ..files.sources import assumed_text
-    from ..files.text import check_writable, write_text
+    from ..files.text import check_writable, prepared_folder, write_text
     from ..jobs.challenges import challenges
     from ..jobs.compare import compare, table
+    from ..jobs.evaluation import cost_scenarios
     from ..jobs.options import effort_of
     from ..problem import assemble
     from ..simulation import within_assumptions
@@ -44,6 +50,9 @@ def run(name: str, output: Path | None, options: Options, allow_code: bool) -> i
     study = study_of(name, allow_code)
     if output is not None:
         check_writable(output)
+    if report is not None:
+        check_report()
+        prepared_folder(report, COMPARISON_NAME)
     problem, effort = assemble(study), effort_of(study, options)
     budget = (effort.population, effort.iterations)
     with bar() as progress:
@@ -51,10 +60,11 @@ def run(name: str, output: Path | None, options: Options, allow_code: bool) -> i
     proved = [s.name for s in challenges(problem, options.seed_of(study)) if within_assumptions(problem, s)]
     table(found, proved, problem.machine.output_unit, click.echo)
     each, told = budget[0] * (budget[1] + 1), found[0].trials
+    on = ", ".join(s.name for s in cost_scenarios(problem))
+    tuned = f"{each} candidates for each of {len(told)} seeds and each controller, tuned on {on}"
     click.echo(
-        f"{each} candidates for each of {len(told)} seeds, tuned on the first runs of the study, scored on all and on "
-        "more; max: the middle seed's largest error after the transient, least and most: of all seeds; limits: largest "
-        "share used; travel: total variation of the input; * the least error",
+        f"{tuned}, scored on all runs above; max: the middle seed's largest error after the transient, least and most: "
+        "of all seeds; limits: largest share used; travel: total variation of the input; * the least error",
         err=True,
     )
     for c in found:
@@ -64,6 +74,8 @@ def run(name: str, output: Path | None, options: Options, allow_code: bool) -> i
     if output is not None:
         write_text(output, to_text(_data(study, found)))
         click.echo(str(output))
+    if report is not None:
+        click.echo(str(write_comparison(problem, found, tuned, proved, report)))
     return PROVED
 
 

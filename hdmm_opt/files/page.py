@@ -1,11 +1,7 @@
 """The template of the report."""
 
-#: Jinja2 template; `report.py` fills it in. One colour a meaning, the same in light, dark and print.
-PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{{ name }}</title>
-<style>
-:root { --ink: #222; --soft: #666; --paper: #fff; --line: #ddd; --head: #f4f4f4; --assumed: #fff3cd;
+#: Style of all pages. One colour a meaning, the same in light, dark and print.
+STYLE = """:root { --ink: #222; --soft: #666; --paper: #fff; --line: #ddd; --head: #f4f4f4; --assumed: #fff3cd;
   --run: #1f5fa8; --certified: #1a8045; --limit: #c0392b }
 @media (prefers-color-scheme: dark) { :root { --ink: #e4e4e4; --soft: #aaa; --paper: #16181b; --line: #3a3d42;
   --head: #23262a; --assumed: #4a3f16; --run: #6aa5e8; --certified: #4cbf7d; --limit: #ea7a6c } }
@@ -30,7 +26,17 @@ figure { margin: 1em 0; break-inside: avoid } #machine { width: 100%; max-height
 @media print { :root { --ink: #000; --soft: #444; --paper: #fff; --line: #bbb; --head: #eee; --assumed: #fff3cd;
   --run: #1f5fa8; --certified: #1a8045; --limit: #c0392b } body { max-width: none; margin: 0 }
   tr, .bar { break-inside: avoid } .control { display: none } h2 { break-after: avoid } }
-</style></head><body>
+"""
+
+#: Jinja2 template; `report.py` fills it in.
+PAGE = (
+    """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{{ name }}</title>
+<style>
+"""
+    + STYLE
+    + """</style></head><body>
 <h1>{{ name }}</h1><p class="soft">{{ summary }}</p>
 <p class="verdict{{ '' if proved else ' bad' }}"><span class="{{ 'proved' if proved else 'refused' }}">
 {{- 'proved' if proved else 'not proved' }}</span>: {{ sentence }}</p>
@@ -142,3 +148,4 @@ are those of the subsystems at the start.
 })();
 </script></body></html>
 """
+)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+
+from trajectories import Reference, constant
 
 from ..plants import Parameter
 from ..problem import Problem
@@ -24,6 +27,20 @@ def challenges(problem: Problem, seed: int) -> list[Scenario]:
     Those that the machine has no parameter or no disturbance for are left out. Not all are inside the assumptions.
     """
     return [*scenarios(problem), *_more(problem, seed)]
+
+
+def grounds(problem: Problem, seed: int) -> list[tuple[Problem, list[Scenario]]]:
+    """What tuned controllers are scored on: the challenges; a period more of delay; a rest, with noise alone."""
+    late = tuple(m.under(replace(m.bounds, delay=m.bounds.delay + m.bounds.period)) for m in problem.members)
+    still = tuple(
+        replace(m, reference=Reference(segments=(constant(float(m.reference(0.0)[0, 0]), 0.0, problem.duration),)))
+        for m in problem.members
+    )
+    noisy = [Scenario(name=name, noise=1.0, seed=seed + k) for k, name in enumerate(("late", "noise-only"), 4)]
+    return [
+        (problem, challenges(problem, seed)), (replace(problem, members=late), noisy[:1]),
+        (replace(problem, members=still), noisy[1:]),
+    ]  # fmt: skip
 
 
 def _more(problem: Problem, seed: int) -> Iterator[Scenario]:

@@ -21,11 +21,11 @@ from ..errors import InvalidInputError
 from ..files.sections import named_gains
 from ..files.state import State
 from ..files.text import upward
-from ..problem import Problem
+from ..problem import GainSet, Problem
 from ..problem.margins import certified_error
-from ..simulation import Figures, Loop, Run, Scenario
+from ..simulation import Figures, Loop, Run
 from .certify import strongest
-from .challenges import challenges
+from .challenges import grounds
 from .evaluation import cost_scenarios, simulated_cost
 from .options import Options, Progress
 from .search import search
@@ -34,6 +34,8 @@ from .start import Tuned, starting_point
 Array = NDArray[np.float64]
 
 SCHEMA = "hdmm-opt/comparison/3"
+#: What is added to the name of the law where it is tuned as its rivals are, without a proof.
+UNPROVED = ", free"
 #: Method that tunes all, and searches with seeds of their own.
 METHOD, SEEDS = "jaya", 5
 
@@ -100,8 +102,8 @@ def compare(
         seeds: Searches of each controller.
 
     Returns:
-        The law, then the rivals. All see the same sensors, observer, delay and limits, tuned on `cost_scenarios` and
-        scored on `challenges`.
+        The law, the law tuned without a proof, then the rivals. All see the same sensors, observer, delay and limits,
+        tuned on `cost_scenarios` and scored on `grounds`.
 
     Raises:
         InvalidInputError: all gains are fixed, or a plant that the rivals are not made for.
@@ -114,69 +116,87 @@ def compare(
         raise InvalidInputError("a comparison needs gains to search: all are fixed; give one min and max")
     progress.stage("proof of a start")
     first = starting_point(problem, progress)
-    loop, law, numbers = Loop(problem), problem.study.controller.law, range(seed, seed + seeds)
-    trials = []
+    law, numbers, trials = problem.study.controller.law, range(seed, seed + seeds), []
+    loop, score = Loop(problem), _Score(problem, None, seed)
     for number in numbers:
         progress.stage(f"{law}, seed {number}")
         state = State(None, {}, resume=False)
-        trials.append(_law(loop, search(problem, first, METHOD, budget, number, options, state, progress), seed))
+        trials.append(_law(loop, search(problem, first, METHOD, budget, number, options, state, progress), score))
     found = [Contender(name=law, trials=tuple(trials))]
+
+    def contend(name: str, simulated: _Simulated) -> None:
+        made = []
+        for number in numbers:
+            progress.stage(f"{name}, seed {number}")
+            made.append(simulated.tuned(budget, number, progress))
+        found.append(Contender(name=name, trials=tuple(made)))
+
+    contend(f"{law}{UNPROVED}", _Simulated(problem, None, seed))
     for name, kind in rivals().items():
         try:
             laws = [kind(plant=m.plant, modelling=problem.study.controller.modelling) for m in problem.members]
         except ValueError as error:
             raise InvalidInputError(f"{error}; compare another machine") from None
-        rival, trials = _Rival(problem, name, laws), []
-        for number in numbers:
-            progress.stage(f"{name}, seed {number}")
-            trials.append(rival.tuned(budget, number, seed, progress))
-        found.append(Contender(name=name, trials=tuple(trials)))
+        contend(name, _Rival(problem, name, laws, seed))
     return found
 
 
-def _law(loop: Loop, tuned: Tuned, seed: int) -> Trial:
-    problem, chosen, given = loop.problem, cost_scenarios(loop.problem), challenges(loop.problem, seed)
-    shown = loop.figures([Run(gains=tuned.gains, scenario=s) for s in (*chosen, *given)])
-    best = strongest(problem, tuned.gains).contracts
-    bound = None if isinstance(best, Failure) else certified_error(problem, best)
+class _Score:
+    """Runs of one kind of controller on all that tuned ones are scored on."""
+
+    def __init__(self, problem: Problem, laws: Sequence[Cascade] | None, seed: int) -> None:
+        self.loops = [(Loop(ground, laws=laws), chosen) for ground, chosen in grounds(problem, seed)]
+
+    def of(self, gains: GainSet) -> dict[str, Figures]:
+        """Figures by scenario."""
+        return {
+            s.name: m
+            for loop, chosen in self.loops
+            for s, m in zip(chosen, loop.figures([Run(gains=gains, scenario=s) for s in chosen]), strict=True)
+        }
+
+
+def _law(loop: Loop, tuned: Tuned, score: _Score) -> Trial:
+    problem, chosen = loop.problem, cost_scenarios(loop.problem)
+    shown = loop.figures([Run(gains=tuned.gains, scenario=s) for s in chosen])
     return Trial(
-        gains=named_gains(problem, tuned.gains), cost=simulated_cost(problem, shown[: len(chosen)]),
-        evaluations=tuned.evaluations, certified=bound,
-        figures={s.name: m for s, m in zip(given, shown[len(chosen) :], strict=True)},
+        gains=named_gains(problem, tuned.gains), cost=simulated_cost(problem, shown),
+        evaluations=tuned.evaluations, certified=_bound(problem, tuned.gains), figures=score.of(tuned.gains),
     )  # fmt: skip
 
 
-class _Rival:
-    """A rival on a problem, with gains that all members share."""
+def _bound(problem: Problem, gains: GainSet) -> float | None:
+    found = strongest(problem, gains).contracts
+    return None if isinstance(found, Failure) else certified_error(problem, found)
 
-    def __init__(self, problem: Problem, name: str, laws: Sequence[Cascade]) -> None:
-        self.problem, self.name = problem, name
-        self.loop = Loop(problem, laws=laws)
-        self.schema: tuple[GainSpec, ...] = laws[0].schema
-        if any([spec.name for spec in law.schema] != [spec.name for spec in self.schema] for law in laws):
-            raise InvalidInputError(f"{name} needs members of one kind, which share its gains: compare another machine")
 
-    def values(self, point: Array) -> tuple[float, ...]:
-        """Gains at a point of the unit cube."""
-        found = []
-        for spec, share in zip(self.schema, point, strict=True):
-            assert spec.low is not None and spec.high is not None
-            found.append(float(spec.low * (spec.high / spec.low) ** share))
-        return tuple(found)
+class _Simulated:
+    """A controller that is tuned in simulation alone: the law itself, with gains that need no proof."""
 
-    def runs(self, point: Array, chosen: Sequence[Scenario]) -> list[Run]:
-        """Runs with one point's gains in every member."""
-        gains = dict.fromkeys(self.problem.machine.members, self.values(point))
-        return [Run(gains=gains, scenario=scenario) for scenario in chosen]
+    def __init__(self, problem: Problem, laws: Sequence[Cascade] | None, seed: int) -> None:
+        self.problem, self.size = problem, problem.searched
+        self.loop, self.score = Loop(problem, laws=laws), _Score(problem, laws, seed)
 
-    def tuned(self, budget: tuple[int, int], seed: int, noise: int, progress: Progress) -> Trial:
-        """The rival after a search from the middle of its ranges."""
-        problem, chosen, given = self.problem, cost_scenarios(self.problem), challenges(self.problem, noise)
+    def gains(self, point: Array) -> GainSet:
+        """Gains of all members at a point of the unit cube."""
+        return self.problem.at(point)
+
+    def named(self, point: Array) -> Mapping[str, float]:
+        """What a point stands for."""
+        return named_gains(self.problem, self.gains(point))
+
+    def bound(self, gains: GainSet) -> float | None:
+        """A certified bound, m, where the gains happen to have one."""
+        return _bound(self.problem, gains)
+
+    def tuned(self, budget: tuple[int, int], seed: int, progress: Progress) -> Trial:
+        """What a search from the middle of its ranges finds."""
+        problem, chosen = self.problem, cost_scenarios(self.problem)
         population, rounds = budget
         allowed = Budget(evaluations=population * (rounds + 1), seconds=problem.study.tuning.seconds or math.inf)
 
         def evaluate(points: Sequence[Array]) -> list[Outcome]:
-            shown = self.loop.figures([run for point in points for run in self.runs(point, chosen)])
+            shown = self.loop.figures([Run(gains=self.gains(p), scenario=s) for p in points for s in chosen])
             return [_outcome(problem, shown[k : k + len(chosen)]) for k in range(0, len(shown), len(chosen))]
 
         def after(now: Any) -> None:
@@ -185,16 +205,37 @@ class _Rival:
                 now.evaluations / allowed.evaluations, f"best {cost:.4g}" if math.isfinite(cost) else "lost"
             )
 
-        middle = np.full(len(self.schema), 0.5)
-        found = run_search(METHOD, evaluate, middle, population, seed, allowed, after=after)
+        found = run_search(METHOD, evaluate, np.full(self.size, 0.5), population, seed, allowed, after=after)
         point = found.points[found.best]
-        shown = self.loop.figures(self.runs(point, given))
+        gains = self.gains(point)
         return Trial(
-            cost=found.outcomes[found.best].cost,
-            gains={spec.name: v for spec, v in zip(self.schema, self.values(point), strict=True)},
-            evaluations=found.evaluations, certified=None,
-            figures={s.name: m for s, m in zip(given, shown, strict=True)},
+            cost=found.outcomes[found.best].cost, gains=self.named(point), evaluations=found.evaluations,
+            certified=self.bound(gains), figures=self.score.of(gains),
         )  # fmt: skip
+
+
+class _Rival(_Simulated):
+    """A rival on a problem, with gains that all members share."""
+
+    def __init__(self, problem: Problem, name: str, laws: Sequence[Cascade], seed: int) -> None:
+        super().__init__(problem, laws, seed)
+        self.schema: tuple[GainSpec, ...] = laws[0].schema
+        self.size = len(self.schema)
+        if any([spec.name for spec in law.schema] != [spec.name for spec in self.schema] for law in laws):
+            raise InvalidInputError(f"{name} needs members of one kind, which share its gains: compare another machine")
+
+    def named(self, point: Array) -> Mapping[str, float]:
+        found = {}
+        for spec, share in zip(self.schema, point, strict=True):
+            assert spec.low is not None and spec.high is not None
+            found[spec.name] = float(spec.low * (spec.high / spec.low) ** share)
+        return found
+
+    def gains(self, point: Array) -> GainSet:
+        return dict.fromkeys(self.problem.machine.members, tuple(self.named(point).values()))
+
+    def bound(self, gains: GainSet) -> float | None:
+        return None
 
 
 def _outcome(problem: Problem, shown: Sequence[Figures]) -> Outcome:

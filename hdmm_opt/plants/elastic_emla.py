@@ -21,7 +21,18 @@ from typing import Any
 from .emla_numbers import LIMITS, STROKE
 from .parameter import EFFECTIVENESS, Parameter
 from .plant import Efforts, Plant
-from .pmsm_emla import EFFORTS, OUTPUT_UNITS, friction_of, pmsm_emla, ratings, screw_loss, symbols, transmission
+from .pmsm_emla import (
+    EFFORTS,
+    OUTPUT_UNITS,
+    completed,
+    friction_of,
+    parameters_of,
+    pmsm_emla,
+    ratings,
+    screw_loss,
+    symbols,
+    transmission,
+)
 from .pmsm_emla import defaults as rigid
 from .registry import PlantModel
 
@@ -38,7 +49,7 @@ OTHER = {"motor": "rod_speed", "load": "motor_speed"}
 
 def defaults(level: str) -> dict[str, Parameter]:
     """The parameters with units, tolerances and sources."""
-    return {**rigid(level), **SPRING}
+    return {**parameters_of(level), **SPRING}
 
 
 def elastic_emla(
@@ -57,15 +68,15 @@ def elastic_emla(
         The plant: states position and speed at the sensor, torque, stretch, speed of the other side.
 
     References:
-        Heydari Shahna (2025), publication P-2, for motor and screw; Ellis (2012, ch. 18) for feedback at the motor and
-        at the load of a drive of two masses.
+        Heydari Shahna (2025), publication P-2, for motor and screw; Ellis (2012) for feedback at the motor and at
+        the load of a drive of two masses.
 
     Not guaranteed: backlash and further modes are not modelled; the losses of the screw do not follow the spring's
         force. With the sensor at the motor a proof is about the motor's side: the rod is `stretch` away from it.
     """
     import casadi as ca
 
-    known, motor = {**defaults(level), **(parameters or {})}, {**ratings(level), **(rated or {})}
+    known, motor = completed({**rigid(level), **SPRING}, parameters), {**ratings(level), **(rated or {})}
     x, u, w, p, q = symbols(5, 1, known)
     r, torque, k = transmission(q), q["torque_scale"] * x[2], q["stiffness"]
     turning, rod = (x[1], x[4]) if sensor == "motor" else (x[4], x[1])

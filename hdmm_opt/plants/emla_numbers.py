@@ -38,6 +38,13 @@ MECHANICAL = {
     "power_scale": Parameter(value=100.0, unit="W", meaning="power over which the screw's loss changes direction"),
     "load_mass": Parameter(value=2000.0, unit="kg", tolerance=0.2, meaning="mass that moves with the rod"),
 }
+#: What a study may add: friction that is larger at standstill. Without it nothing of the plant reads them.
+STRIBECK = {
+    "stribeck_friction": Parameter(
+        loss=True, value=0.0, unit="N", tolerance=0.5, meaning="friction beyond Coulomb's before the rod slides"
+    ),
+    "stribeck_speed": Parameter(value=0.01, unit="m/s", meaning="speed at which half of that is left"),
+}
 TORQUE = {
     "torque_scale": Parameter(value=1.0, unit="1", tolerance=0.03, meaning="torque delivered per torque commanded"),
     "drive_lag": Parameter(value=0.0003, unit="s", tolerance=0.2, meaning="time constant of the drive's current loop"),

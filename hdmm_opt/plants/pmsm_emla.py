@@ -20,7 +20,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .emla_numbers import LIMITS, MECHANICAL, MOTOR, PEAK, RATED, STROKE, TORQUE
+from .emla_numbers import LIMITS, MECHANICAL, MOTOR, PEAK, RATED, STRIBECK, STROKE, TORQUE
 from .parameter import EFFECTIVENESS, Parameter
 from .plant import Efforts, Plant
 from .registry import PlantModel
@@ -39,6 +39,17 @@ def defaults(level: str) -> dict[str, Parameter]:
     if level not in LEVELS:
         raise ValueError(f'plant.level is "torque" or "voltage": got "{level}"')
     return {**MECHANICAL, **(TORQUE if level == "torque" else MOTOR)}
+
+
+def parameters_of(level: str) -> dict[str, Parameter]:
+    """`defaults`, and what a study may add."""
+    return {**defaults(level), **STRIBECK}
+
+
+def completed(known: Mapping[str, Parameter], given: Mapping[str, Parameter] | None) -> dict[str, Parameter]:
+    """Known parameters with replacements, and those of Stribeck's friction where one of them is given."""
+    asked = STRIBECK if set(given or {}) & set(STRIBECK) else {}
+    return {**known, **asked, **(given or {})}
 
 
 def ratings(level: str) -> dict[str, Parameter]:
@@ -68,7 +79,7 @@ def pmsm_emla(
 
     Args:
         level: "torque" (u in N m, drive with its own current loop) or "voltage" (u_q, u_d in V).
-        parameters: Replacements for `defaults(level)`.
+        parameters: Replacements for `parameters_of(level)`.
         rated: Replacements for `ratings(level)`.
 
     Returns:
@@ -81,15 +92,18 @@ def pmsm_emla(
     Not guaranteed: backlash, cogging, saturation and thermal effects are not modelled; screw and gear are rigid, see
     `elastic_emla`.
     """
-    known, motor = {**defaults(level), **(parameters or {})}, {**ratings(level), **(rated or {})}
+    known, motor = completed(defaults(level), parameters), {**ratings(level), **(rated or {})}
     return _torque_level(known, motor) if level == "torque" else _voltage_level(known, motor)
 
 
 def friction_of(v: Any, q: Mapping[str, Any]) -> Any:
-    """Coulomb friction at the rod, N."""
+    """Friction at the rod, N: Coulomb's, and where it is given Stribeck's (Hess and Soom 1990)."""
     import casadi as ca
 
-    return q["coulomb_friction"] * ca.tanh(v / q["friction_speed"])
+    size, direction = q["coulomb_friction"], ca.tanh(v / q["friction_speed"])
+    if "stribeck_friction" not in q:
+        return size * direction
+    return (size + q["stribeck_friction"] / (1 + (v / q["stribeck_speed"]) ** 2)) * direction
 
 
 def screw_loss(force: Any, v: Any, q: Mapping[str, Any]) -> Any:
@@ -255,4 +269,4 @@ EFFORTS = Efforts(
     limits=("torque_nm", "torque_nm", "current_a", "current_a", "voltage_v"), of=effort,
 )  # fmt: skip
 
-PLANT = PlantModel(levels=LEVELS, defaults=defaults, build=pmsm_emla, ratings=ratings)
+PLANT = PlantModel(levels=LEVELS, defaults=parameters_of, build=pmsm_emla, ratings=ratings)

@@ -3,7 +3,10 @@
 import pytest
 from machines import emla, quick_arm, study_from
 
-from hdmm_opt.jobs.challenges import challenges
+from hdmm_opt.files.comparison import write_comparison
+from hdmm_opt.jobs.challenges import challenges, grounds
+from hdmm_opt.jobs.compare import compare
+from hdmm_opt.jobs.options import Options, Progress
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import within_assumptions
 
@@ -31,3 +34,28 @@ def test_seeds_of_the_noise_are_those_asked_for():
     problem = assemble(study_from(emla("emla-p2")))
     first, again, other = (challenges(problem, seed)[-1] for seed in (1, 1, 7))
     assert first == again and first.seed != other.seed
+
+
+def test_a_period_more_and_a_rest_are_grounds_of_their_own():
+    problem = assemble(study_from(emla("emla-p2")))
+    (_, whole), (late, (later,)), (still, (noisy,)) = grounds(problem, 1)
+    (member,), (slow,), (resting,) = problem.members, late.members, still.members
+    assert [s.name for s in whole] == [s.name for s in challenges(problem, 1)]
+    assert slow.bounds.delay == member.bounds.delay + member.bounds.period and later.name == "late"
+    ends = resting.reference.bounds()
+    assert noisy.name == "noise-only" and ends[0][0] == ends[0][1] == member.reference(0.0)[0, 0]
+    assert ends[1][0] == ends[1][1] == 0 and still.duration == problem.duration
+
+
+def test_a_comparison_is_the_same_twice_and_its_page_stands_by_itself(tmp_path):
+    problem = assemble(study_from(emla("emla-p2")))
+    found, again = (compare(problem, (3, 1), 1, Options(), Progress(), seeds=1) for _ in range(2))
+    told = [
+        [(t.gains, {k: m.to_data() for k, m in t.figures.items()}) for c in f for t in c.trials] for f in (found, again)
+    ]
+    assert told[0] == told[1]
+    page = write_comparison(problem, found, "Tuned a little", ["heavy"], tmp_path).read_text(encoding="utf-8")
+    assert all(f"<h2>{name}</h2>" in page for name in found[0].trials[0].figures)
+    assert page.count('class="best"') == len(found[0].trials[0].figures)
+    assert "http" not in page and "src=" not in page and "load_mass" in page  # nothing from elsewhere; what is assumed
+    assert "inside the assumptions" in page and "{{" not in page

@@ -46,10 +46,19 @@ def gains_of(problem, beta_1, beta_2, gamma_2):
     return tuple(given.get(item.name, item.low) for item in member.ranges)
 
 
+#: Friction that is larger at standstill, as a study gives it.
+STRIBECK = {
+    "stribeck_friction": {"value": 400.0, "unit": "N", "source": "assumed"},
+    "stribeck_speed": {"value": 0.01, "unit": "m/s", "source": "assumed"},
+}
+
+
 @pytest.mark.parametrize(("sensor", "values"), [("motor", MOTOR), ("load", LOAD)])
 def test_agrees_with_an_independent_adaptive_integrator(sensor, values):
     """Two masses, a spring and a law written by hand in the positions of both sides, integrated by SciPy at 1e-10."""
-    problem = problem_of(sensor=sensor)
+    data = screw(sensor)
+    data["plant"]["parameters"] |= STRIBECK
+    problem = assemble(study_from(data))
     (member,) = problem.members
     gains, q = gains_of(problem, *values), member.plant.values()
     r, k, load = transmission(q), q["stiffness"], 70e3
@@ -57,7 +66,8 @@ def test_agrees_with_an_independent_adaptive_integrator(sensor, values):
     def rates(t, x, u):
         x_m, v_m, x_l, v_l, torque = x
         carried = k * (x_m - x_l + q["spring_damping"] * (v_m - v_l))
-        steady = load + q["coulomb_friction"] * np.tanh(v_m / q["friction_speed"])
+        rubbing = q["coulomb_friction"] + 400.0 / (1 + (v_m / 0.01) ** 2)
+        steady = load + rubbing * np.tanh(v_m / q["friction_speed"])
         share = q["screw_friction"] / lead_angle_tangent(q) + q["gear_loss"]
         lost = np.tanh(steady * v_m / q["power_scale"]) * share * steady
         pushed = torque - q["viscous_friction"] * v_m / r - r * (carried + steady - load + lost)
@@ -210,3 +220,26 @@ def test_the_bundled_file_says_what_the_spring_does():
     rows = document["members"][0]["model"]["rows"]
     assert rows[3]["target"] == {"load_force/stiffness": 1.0, "r2": pytest.approx(4e-6)}
     assert document["study"]["plant"]["sensor"] == "motor"
+
+
+def test_friction_at_standstill_is_larger_only_where_a_study_says_so():
+    """Hess and Soom's curve; without it the plant has no such parameter, as in files of before."""
+    data = tomllib.loads(bundled_text("emla-p2"))
+    assert "stribeck_friction" not in assemble(study_from(data)).members[0].plant.parameters
+    data["plant"]["parameters"] |= STRIBECK
+    problem = assemble(study_from(data))
+    plant = problem.members[0].plant
+    force = ca.Function("h", [plant.x, plant.u, plant.w, plant.p], [plant.force])
+    without = plant.values() | {"stribeck_friction": 0.0}
+    r = transmission(plant.values())
+    for speed in (0.002, 0.01, 0.05):
+        h = [float(force([0, speed, 20], 0, 0, list(v.values()))[1]) for v in (plant.values(), without)]
+        wanted = 400.0 / (1 + (speed / 0.01) ** 2) * np.tanh(speed / plant.values()["friction_speed"])
+        assert (h[1] - h[0]) / r == pytest.approx(wanted, rel=0.2)  # with what the screw loses of it besides
+        assert (h[1] - h[0]) / r > wanted
+    rubbing, smooth = (
+        certificate(p.members[0], gains_of(p, 60.0, 18000.0, 4e5))
+        for p in (problem, assemble(study_from(tomllib.loads(bundled_text("emla-p2")))))
+    )
+    assert not isinstance(rubbing, Failure) and not isinstance(smooth, Failure)
+    assert smooth.ultimate[0] < rubbing.ultimate[0] < 2 * smooth.ultimate[0]
