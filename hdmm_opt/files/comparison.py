@@ -25,7 +25,8 @@ PAGE = (
 <style>
 """
     + STYLE
-    + """.best { font-weight: 700 } td .track { min-width: 9em; border-right: 0 } td .track i { background: var(--run) }
+    + """.best { font-weight: 700 } td .track { min-width: 6em; border-right: 0 }
+td:first-child { white-space: nowrap } td .track i { background: var(--run) }
 .lost { color: var(--limit) }
 </style></head><body>
 <h1>{{ name }}: the law and its rivals</h1><p class="soft">{{ summary }}</p>
@@ -105,7 +106,7 @@ def _row(c: Any, name: str, best: float, worst: float, inside: Sequence[str]) ->
         "name": c.name, "best": error == best, "lost": not math.isfinite(error), "middle": _size(error),
         "width": f"{100 * min(max(decades / DECADES, 0.01), 1):.1f}", "least": _size(errors[0]),
         "most": _size(errors[-1]), "rms": _size(m.rms_error_m), "settled": f"{m.settling_time_s:.3g}",
-        "limits": f"{m.limit_use:.3g}", "travel": f"{sum(own.travel for own in m.members.values()):.4g}",
+        "limits": f"{m.limit_use:.3g}", "travel": f"{sum(own.travel for own in m.members.values()):,.0f}",
         "certified": upward(1e3 * c.certified) if c.certified is not None and name in inside else "none",
     }  # fmt: skip
 
