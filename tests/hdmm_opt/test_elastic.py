@@ -1,6 +1,7 @@
 """A screw that is a spring: its equations, its simulation, its proof."""
 
 import json
+import re
 import tomllib
 from dataclasses import replace
 from fractions import Fraction
@@ -13,13 +14,14 @@ from machines import study_from
 from scipy.integrate import solve_ivp
 
 from hdmm_opt.errors import InvalidInputError
-from hdmm_opt.jobs.certify import certificate
+from hdmm_opt.jobs import reserve
+from hdmm_opt.jobs.certify import certificate, contracts_of
 from hdmm_opt.plants.elastic_emla import elastic_emla
 from hdmm_opt.plants.pmsm_emla import lead_angle_tangent, pmsm_emla, transmission
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop, Run, Scenario
 from hdmm_opt.study.read import bundled_text
-from stability import Failure
+from stability import Failure, Interval
 from stability.checking.limits import NotProvedError
 from stability.checking.loop import Loop as CheckedLoop
 
@@ -243,3 +245,16 @@ def test_friction_at_standstill_is_larger_only_where_a_study_says_so():
     )
     assert not isinstance(rubbing, Failure) and not isinstance(smooth, Failure)
     assert smooth.ultimate[0] < rubbing.ultimate[0] < 2 * smooth.ultimate[0]
+
+
+def test_the_stiffness_that_is_told_is_certified(proved, monkeypatch):
+    problem, values, _ = proved
+    (member,) = problem.members
+    monkeypatch.setattr(reserve, "STEPS", 2)
+    gains = {member.name: values}
+    told, _ = reserve.reserve_lines(problem, gains, contracts_of(problem, gains))
+    share = float(re.search(r"stiffness down to ([0-9.]+) % of what is assumed", told)[1]) / 100
+    assert 0.1 <= share <= 1
+    known = member.bounds.parameters
+    softer = replace(member.bounds, parameters={**known, "stiffness": known["stiffness"] * Interval(share * 1.001)})
+    assert not isinstance(certificate(member.under(softer), values, refine=True), Failure)
