@@ -22,7 +22,7 @@ from ..files.sections import named_gains
 from ..files.state import State
 from ..files.text import upward
 from ..problem import GainSet, Problem
-from ..problem.margins import certified_error
+from ..problem.margins import certified_error, violation
 from ..simulation import Figures, Loop, Run
 from .certify import strongest
 from .challenges import grounds
@@ -166,8 +166,11 @@ def _law(loop: Loop, tuned: Tuned, score: _Score) -> Trial:
 
 
 def _bound(problem: Problem, gains: GainSet) -> float | None:
+    """The certified bound on the output, m; None where there is none, or where the certified set passes a limit."""
     found = strongest(problem, gains).contracts
-    return None if isinstance(found, Failure) else certified_error(problem, found)
+    if isinstance(found, Failure) or violation(problem, found, gains) > 0:
+        return None
+    return certified_error(problem, found)
 
 
 class _Simulated:

@@ -3,12 +3,15 @@
 import pytest
 from machines import emla, quick_arm, study_from
 
+from hdmm_opt import study
 from hdmm_opt.files.comparison import write_comparison
+from hdmm_opt.jobs.certify import strongest
 from hdmm_opt.jobs.challenges import challenges, grounds
-from hdmm_opt.jobs.compare import compare
+from hdmm_opt.jobs.compare import _bound, compare
 from hdmm_opt.jobs.options import Options, Progress
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import within_assumptions
+from stability import Failure
 
 
 def test_one_actuator_has_them_all_and_what_leaves_the_assumptions_is_told():
@@ -59,3 +62,14 @@ def test_a_comparison_is_the_same_twice_and_its_page_stands_by_itself(tmp_path):
     assert page.count('class="best"') == len(found[0].trials[0].figures)
     assert "http" not in page and "src=" not in page and "load_mass" in page  # nothing from elsewhere; what is assumed
     assert "inside the assumptions" in page and "{{" not in page
+
+
+def test_a_bound_that_passes_a_limit_is_none():
+    """High gains on emla-p2: there is a certificate, and its set asks for more torque than there is."""
+    problem = assemble(study.load("emla-p2"))
+    (member,) = problem.members
+    for own, there in (((60.0, 18000.0, 4e5), True), ((100.0, 25000.0, 1.5e6), False)):
+        given = dict(zip(("beta_1", "beta_2", "gamma_2"), own, strict=True))
+        gains = {member.name: tuple(given.get(item.name, item.low) for item in member.ranges)}
+        assert not isinstance(strongest(problem, gains).contracts, Failure)
+        assert (_bound(problem, gains) is not None) == there
