@@ -34,7 +34,7 @@ def command(
 
 def run(name: str, output: Path | None, report: Path | None, options: Options, allow_code: bool) -> int:
     """Tune all, run all, show the table."""
-    from ..files.comparison import COMPARISON_NAME, write_comparison
+    from ..files.comparison import COMPARISON_NAME, gains_text, write_comparison
     from ..files.report import check_report
     from ..files.seal import to_text
     from ..files.sources import assumed_text
@@ -68,8 +68,7 @@ def run(name: str, output: Path | None, report: Path | None, options: Options, a
         err=True,
     )
     for c in found:
-        gains = ", ".join(f"{name} {value:.3g}" for name, value in c.trials[0].gains.items())
-        click.echo(f"{c.name}, first seed: {gains}", err=True)
+        click.echo(f"{c.name}, first seed: {gains_text(c)}", err=True)
     click.echo(f"assumed, to be replaced by yours: {assumed_text(problem)}", err=True)
     if output is not None:
         write_text(output, to_text(_data(study, found)))

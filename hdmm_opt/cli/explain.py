@@ -108,7 +108,7 @@ def _sources(result: Design) -> None:
 
 def _errors(result: Design, document: dict[str, Any]) -> None:
     """Certified and simulated errors of the output, the members, and the speeds that are estimated."""
-    from ..files.read import certified_of, ultimate_of
+    from ..files.read import above, certified_of, ultimate_of
     from ..files.text import upward
 
     problem, shown = result.problem, document["validation"]
@@ -125,8 +125,7 @@ def _errors(result: Design, document: dict[str, Any]) -> None:
         for row, size in bounds:
             if isinstance(row["target"], dict):  # a mode: what it is in the motion asked for, and how far from it
                 asked = " + ".join(f"{share:g} {name}" for name, share in row["target"].items())
-                size = upward(float(Fraction(size)) * 1e3)
-                _say(f"{row['state']}: certified within {size} m{row['unit']} of {asked}", 4)
+                _say(f"{row['state']}: certified within {upward(above(size) * 1e3)} m{row['unit']} of {asked}", 4)
     for entry in document["members"] if len(document["members"]) > 1 else []:
         own, plant = shown["members"][entry["name"]], problem.member(entry["name"]).plant
         seen, size = own["largest_error_after_transient"], upward(ultimate_of(entry) * 1e3)

@@ -10,7 +10,6 @@ standstill a proof has to allow for both directions. Its use lowers the simulate
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from ..plants import Plant
@@ -29,7 +28,7 @@ def check_modelling(plant: Plant, modelling: tuple[str, ...]) -> None:
     Raises:
         ValueError: such a term.
     """
-    if modelling and any(isinstance(target, Mapping) for target in plant.targets):
+    if modelling and plant.modes:
         raise ValueError("controller.modelling needs a plant whose states are all measured: leave it empty")
     for term in modelling:
         if term not in MODELLING:

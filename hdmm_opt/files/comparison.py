@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..problem import Problem
-from .page import STYLE
+from .page import HEAD
 from .sources import assumed_text
 from .text import upward, write_text
 
@@ -19,12 +19,7 @@ DECADES = 4.0
 
 #: Jinja2 template; `write_comparison` fills it in.
 PAGE = (
-    """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{{ name }}: comparison</title>
-<style>
-"""
-    + STYLE
+    HEAD
     + """.best { font-weight: 700 } td .track { min-width: 6em; border-right: 0 }
 td:first-child { white-space: nowrap } td .track i { background: var(--run) }
 .lost { color: var(--limit) }
@@ -71,13 +66,11 @@ def write_comparison(problem: Problem, found: Sequence[Any], tuned: str, inside:
 
     study, bound, unit = problem.study, found[0].certified, f"m{problem.machine.output_unit}"
     text = Environment(autoescape=True).from_string(PAGE).render(
-        name=study.study.name, summary=study.study.summary, tuned=tuned, law=found[0].name, unit=unit,
+        title=f"{study.study.name}: comparison", name=study.study.name, summary=study.study.summary, tuned=tuned,
+        law=found[0].name, unit=unit,
         bound=None if bound is None else f"{upward(1e3 * bound)} {unit}", decades=int(DECADES),
         runs=[_run(name, found, inside) for name in found[0].trials[0].figures],
-        tunings=[
-            {"name": c.name, "gains": ", ".join(f"{name} {value:.3g}" for name, value in c.trials[0].gains.items())}
-            for c in found
-        ],
+        tunings=[{"name": c.name, "gains": gains_text(c)} for c in found],
         assumed=assumed_text(problem),
     )  # fmt: skip
     target = folder / COMPARISON_NAME
@@ -103,13 +96,19 @@ def _row(c: Any, name: str, best: float, worst: float, inside: Sequence[str]) ->
     if math.isfinite(error) and error > 0:
         decades = DECADES + math.log10(error / worst)
     return {
-        "name": c.name, "best": error == best, "lost": not math.isfinite(error), "middle": _size(error),
-        "width": f"{100 * min(max(decades / DECADES, 0.01), 1):.1f}", "least": _size(errors[0]),
-        "most": _size(errors[-1]), "rms": _size(m.rms_error_m), "settled": f"{m.settling_time_s:.3g}",
+        "name": c.name, "best": error == best, "lost": not math.isfinite(error), "middle": error_text(error),
+        "width": f"{100 * min(max(decades / DECADES, 0.01), 1):.1f}", "least": error_text(errors[0]),
+        "most": error_text(errors[-1]), "rms": error_text(m.rms_error_m), "settled": f"{m.settling_time_s:.3g}",
         "limits": f"{m.limit_use:.3g}", "travel": f"{sum(own.travel for own in m.members.values()):,.0f}",
         "certified": upward(1e3 * c.certified) if c.certified is not None and name in inside else "none",
     }  # fmt: skip
 
 
-def _size(error: float) -> str:
+def gains_text(c: Any) -> str:
+    """Gains of a controller's first seed in one line."""
+    return ", ".join(f"{name} {value:.3g}" for name, value in c.trials[0].gains.items())
+
+
+def error_text(error: float) -> str:
+    """An error of a run in thousandths of its unit."""
     return f"{1e3 * error:.3g}" if math.isfinite(error) else "lost"

@@ -28,14 +28,19 @@ figure { margin: 1em 0; break-inside: avoid } #machine { width: 100%; max-height
   tr, .bar { break-inside: avoid } .control { display: none } h2 { break-after: avoid } }
 """
 
-#: Jinja2 template; `report.py` fills it in.
-PAGE = (
+#: Beginning of all pages, up to what they add to the style.
+HEAD = (
     """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{{ name }}</title>
+<title>{{ title }}</title>
 <style>
 """
     + STYLE
+)
+
+#: Jinja2 template; `report.py` fills it in.
+PAGE = (
+    HEAD
     + """</style></head><body>
 <h1>{{ name }}</h1><p class="soft">{{ summary }}</p>
 <p class="verdict{{ '' if proved else ' bad' }}"><span class="{{ 'proved' if proved else 'refused' }}">

@@ -66,7 +66,8 @@ def write_report(document: Mapping[str, Any], folder: Path, verdict: checker.Rep
     proved = verdict is not None and verdict.status == 0
     made = pictures(document, problem, gains)
     text = Environment(autoescape=True).from_string(PAGE).render(
-        name=problem.study.study.name, summary=problem.study.study.summary, proved=proved, upward=upward,
+        title=problem.study.study.name, name=problem.study.study.name,
+        summary=problem.study.study.summary, proved=proved, upward=upward,
         sentence=_sentence(document, problem, verdict), refusals=_refusals(document),
         bars=_bars(problem, made, verdict), sections=_sections(made), animation=_animation(problem, made),
         worst=_worst(document, problem.machine.output_unit), bundled=bundled_text(problem),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from ..plants.own import own_name
 from ..problem import Member, Problem
@@ -53,8 +53,7 @@ def exact_text(problem: Problem) -> str:
 def _unmeasured(member: Member) -> set[str]:
     """States that the controller does not measure: a speed that it estimates, and a mode that it leaves to itself."""
     plant = member.plant
-    modes = {s for s, target in zip(plant.states, plant.targets, strict=True) if isinstance(target, Mapping)}
-    return {*modes, plant.states[1]} if member.bounds.observer else modes
+    return {*plant.modes, *(plant.states[1:2] if member.bounds.observer else ())}
 
 
 def _listed(problem: Problem, names: Iterable[str]) -> str:

@@ -18,6 +18,7 @@ from ..control import GainSpec
 from ..control.rivals.cascade import Cascade
 from ..control.rivals.registry import rivals
 from ..errors import InvalidInputError
+from ..files.comparison import error_text
 from ..files.sections import named_gains
 from ..files.state import State
 from ..files.text import upward
@@ -266,13 +267,9 @@ def table(found: Sequence[Contender], proved: Sequence[str], unit: str, writes: 
         for c in found:
             errors, m = c.errors(scenario), c.middle(scenario)
             bound = "" if c.certified is None or scenario not in proved else upward(1e3 * c.certified)
-            sizes = [_size(error) for error in (m.maximum_error_m, errors[0], errors[-1])]
+            sizes = [error_text(error) for error in (m.maximum_error_m, errors[0], errors[-1])]
             sizes[0] += "*" if math.isfinite(best) and m.maximum_error_m == best else ""
             travel = sum(own.travel for own in m.members.values())
-            rest = (_size(m.rms_error_m), f"{m.settling_time_s:.3g}", f"{m.limit_use:.3g}", f"{travel:.4g}", bound)
+            rest = (error_text(m.rms_error_m), f"{m.settling_time_s:.3g}", f"{m.limit_use:.3g}", f"{travel:.4g}", bound)
             cells = zip((*sizes, *rest), widths, strict=True)
             writes(f"{scenario:18}{c.name:15}" + "".join(f"{text:>{width}}" for text, width in cells))
-
-
-def _size(error: float) -> str:
-    return f"{1e3 * error:.3g}" if math.isfinite(error) else "lost"

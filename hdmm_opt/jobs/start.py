@@ -102,13 +102,9 @@ def with_bandwidths(member: Member, values: Values, widths: Sequence[float], net
 def _per_gain(member: Member, values: Values) -> list[float]:
     gains = member.gains(values)
     rows = error_rows(member.model, member.bounds, gains, 1e-9 * member.box, np.zeros(len(member.model.inputs)))
-    found = []
-    for i in member.law.controlled:
-        row = member.model.driven(i)
-        # no effect at all: an actuator that may be stuck
-        effect = rows.control_gain[i] if rows.control_gain[i] > NOTHING else 1.0
-        found.append(float(effect / (2 * rows.mass_high[row])))
-    return found
+    # no effect at all: an actuator that may be stuck
+    effects = {i: rows.control_gain[i] if rows.control_gain[i] > NOTHING else 1.0 for i in member.law.controlled}
+    return [float(effect / (2 * rows.mass_high[member.model.driven[i]])) for i, effect in effects.items()]
 
 
 def starting_point(problem: Problem, progress: Progress) -> Tuned:

@@ -108,6 +108,12 @@ class Plant:
     ratings: Mapping[str, Parameter] = field(default_factory=dict)
 
     @property
+    def modes(self) -> tuple[str, ...]:
+        """States that no law acts in and that follow no row: nobody measures them."""
+        pairs = zip(self.states, self.targets, strict=True)
+        return tuple(state for state, target in pairs if isinstance(target, Mapping))
+
+    @property
     def operating(self) -> tuple[float, ...]:
         """State at which the time constants are read off: the middle of the stroke, half of each state's own limit."""
         own = {limit.signals[0]: limit.value / 2 for limit in self.limits if len(limit.signals) == 1}

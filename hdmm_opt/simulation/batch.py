@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.law import step_function
-from ..problem import GainSet, Problem
+from ..problem import GainSet, Member, Problem
 from .engine.engine import Batch
 from .layout import Part, size_of
 from .scenario import SOUND, Scenario, course_at
@@ -126,11 +126,12 @@ class Batches:
             load = [first[4 * n + k]] if self.problem.foreseeing else [
                 member.bounds.nominal[name] for name in member.plant.disturbances
             ]  # fmt: skip
-            gains = part.constants(fixed)["gains"]
+            constants = part.constants(fixed)
+            gains = constants["gains"]
             reference = np.repeat(r[:, None], lanes, axis=1)
-            acting = self._acting(member.plant.disturbances, scenarios)
+            acting = self._acting(member, scenarios)
             for i in range(1, len(own)):
-                target = self._targets(k, own, reference, gains, load, acting, part.constants(fixed)["parameters"])[i]
+                target = self._targets(k, own, reference, gains, load, acting, constants["parameters"])[i]
                 own[i] = target + np.clip(-target, -initial[i], initial[i])
             x[part.x] = own
             discrete = part.discrete(z)
@@ -154,18 +155,19 @@ class Batches:
         step, lanes = self._steps[k], x.shape[1]
         return np.array(step.map(lanes)(x, r, z, gains, *(np.tile(v, (lanes, 1)).T for v in (nominal, list(load))))[0])
 
-    def _acting(self, names: Sequence[str], scenarios: Sequence[Scenario]) -> Array:
-        """The disturbances of a member at the first instant, the middles of those that jump; zero for a coupling's.
+    def _acting(self, member: Member, scenarios: Sequence[Scenario]) -> Array:
+        """The disturbances that a member's targets read, at the first instant; the middles of those that jump.
 
         Shape (w, lanes).
         """
-        own = {d.name for d in self.problem.machine.disturbances}
+        names = member.plant.disturbances
+        read = {name.partition("/")[0] for row in member.model.rows for name in row.place}
         found = np.zeros((len(names), len(scenarios)))
         for k, name in enumerate(names):
-            for lane, scenario in enumerate(scenarios if name in own else ()):
-                middle = self._middle(name)
-                course = middle if self.problem.rate_of(name) is None else scenario.disturbances.get(name, middle)
-                found[k, lane] = course_at(course, np.zeros(1))[0]
+            if name in read:
+                middle, jumps = self._middle(name), self.problem.rate_of(name) is None
+                courses = (middle if jumps else s.disturbances.get(name, middle) for s in scenarios)
+                found[k] = [course_at(course, np.zeros(1))[0] for course in courses]
         return found
 
     def _targets(

@@ -30,7 +30,7 @@ from ..loops.responses import Responses, responses
 from ..loops.stack import MAX_DELAY, Controller, Stack, controller, delay_of, wiring
 from ..loops.turn import turn
 from .certificate import Certificate, Failure
-from .small_gain import CALM, Cell, Cut, cell_of, cells_of, closed, cut_for, late_of, middle_of, small_gain
+from .small_gain import Cell, Cut, cell_of, cells_of, closed, cut_for, late_of, middle_of, ringing_of, small_gain
 
 Array = NDArray[np.float64]
 
@@ -152,8 +152,8 @@ class Search:
         """How much longer rows ring than those of a loop that does not, where the law leaves a mode to itself."""
         if not self.model.rings:
             return 1.0
-        (whole,), n = self._responses(self.rows, bounds), len(self.model.rows)
-        return 1.0 if whole is None else np.maximum(1.0, np.diag(whole.plain.rest[n : 2 * n]) / CALM)
+        (whole,) = self._responses(self.rows, bounds)
+        return 1.0 if whole is None else ringing_of(whole)
 
     def _responses(self, rows: DeviationRows, bounds: Bounds) -> list[Responses | None]:
         return [responses(self._stack(part, bounds)) for part in cells_of(rows, self.split)]

@@ -68,6 +68,12 @@ def cut_for(rows: int, *, ringing: bool, fine: bool) -> Cut:
     return FEWER if rows > MANY else FINE
 
 
+def ringing_of(whole: Responses) -> Array:
+    """How much longer each row's rate answers to a push of its own than in a loop that does not ring. Shape (n,)."""
+    n = whole.stack.sizes[0]
+    return np.asarray(np.maximum(1.0, np.diag(whole.plain.rest[n : 2 * n]) / CALM), dtype=np.float64)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Cell:
     """What the checker needs to know of the loop for a part of the inertias' ranges.

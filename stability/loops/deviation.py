@@ -160,7 +160,7 @@ class _Builder(Builder):
         rows, term_rates = self._rows(
             forces, masses, [f.scaled(ONE / mass) for f, mass in zip(forces, masses, strict=True)]
         )
-        places = {i: self.model.driven(i) for i in self.networks}
+        places = {i: self.model.driven[i] for i in self.networks}
         demands = {i: self._demand(i, raw[k], rows[k], masses[k], self.target_rate[k]) for i, k in places.items()}
         rest = {places[i]: demand.rest for i, demand in demands.items()}
         left = [rest[k] if k in rest else self._disturbance(row, "Qe") for k, row in enumerate(rows)]

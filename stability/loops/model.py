@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from ..enclosures.expression import Expression
@@ -63,18 +64,28 @@ class LoopModel:
         """Indices of the rows that carry gains."""
         return tuple(i for i, row in enumerate(self.rows) if row.controlled)
 
-    @property
+    @cached_property
     def rings(self) -> bool:
         """Whether there is a mode that the law leaves to itself: states that follow no row and no law."""
         return any(row.place and not row.controlled for row in self.rows)
 
-    @property
+    @cached_property
     def quotients(self) -> list[str]:
         """Names "DISTURBANCE/PARAMETER" in targets: the plant's divisions of both are these signals, too."""
         return sorted({name for row in self.rows for name in row.place if "/" in name})
 
-    def driven(self, i: int) -> int:
-        """The row that what carries out κ_i acts in: row i, or where that does not read it, the only one that does."""
+    @cached_property
+    def program(self) -> Expression:
+        """The plant with its quotients as inputs of their own."""
+        return self.plant.joined(self.quotients)
+
+    @cached_property
+    def driven(self) -> Mapping[int, int]:
+        """For each controlled row the one that what carries out κ_i acts in; see `_driven`."""
+        return {i: self._driven(i) for i in self.controlled}
+
+    def _driven(self, i: int) -> int:
+        """Row i, or where that does not read what carries out κ_i, the only one that does."""
         follower = next((row.state for row in self.rows if row.target == i), None)
         follower = self.inputs[self.input_map.index(i)] if follower is None else follower
         n = len(self.rows)

@@ -250,7 +250,7 @@ class Builder:
         for k, (name, row) in enumerate(zip(self.model.inputs, self.model.input_map, strict=True)):
             form = self._control(row) + Form.of(f"e{k}")
             self.inputs[name] = self.symbols.value(name, form)
-        return evaluate(self.model.plant.joined(self.model.quotients), self.inputs, self.symbols)
+        return evaluate(self.model.program, self.inputs, self.symbols)
 
     def _rows(
         self, forces: list[Form], masses: list[Interval], rates: list[Form]
