@@ -112,7 +112,8 @@ golden: Golden vectors follow from the gains and the law, to float accuracy.
 effects: Whether a plant and a coupling feel what the study states.
 
   Two floats that differ are a witness that they do; nothing is proved of how much. Obligation: plant. Must fail: a
-  plant that multiplies its load by 0, a parameter without effect, a machine that is the same for every payload.
+  plant that multiplies its load by 0, a parameter without effect in the set and in its mirror image, a machine that is
+  the same for every payload.
 
 obligations: All obligations of a member, decided.
 
@@ -479,6 +480,10 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
             return table.node(key, plus(a.form, b.form), add(a.range, b.range))
         if operator == "sub":
             return table.node(key, plus(a.form, times(b.form, neg(ONE))), add(a.range, neg(b.range)))
+        if operator == "max":
+            if apart(a.range, b.range):
+                return a if a.range[0] >= b.range[1] else b
+            return table.fresh(key, between(a.form, b.form), greater(a.range, b.range))
         if operator == "div":
             form, natural = times(a.form, inverse(b.range)), mul(a.range, inverse(b.range))
             return (table.node if set(b.form) <= {""} else table.fresh)(key, form, natural)
@@ -496,6 +501,21 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
 
     entries = walk(program, inputs.__getitem__, const, apply)
     return [entries[i] for i in program["outputs"]]
+
+
+def greater(a: Interval, b: Interval) -> Interval:
+    """Range of the larger of two numbers."""
+    return max(a[0], b[0]), max(a[1], b[1])
+
+
+def apart(a: Interval, b: Interval) -> bool:
+    """Whether ranges decide which of two numbers is the larger."""
+    return a[0] >= b[1] or b[0] >= a[1]
+
+
+def between(a: Form, b: Form) -> Form:
+    """All forms between two: max(a, b) = b + s (a - b) with s from 0 to 1."""
+    return plus(b, times(plus(a, times(b, neg(ONE))), (Fraction(0), Fraction(1))))
 
 
 def outside(form: Form) -> bool:
@@ -526,6 +546,10 @@ def derivative(program: dict[str, Any], ranges: dict[str, Interval], tangents: d
             return add(x, neg(y)), plus(dx, times(dy, neg(ONE)))
         if operator == "mul":
             return mul(x, y), plus(times(dx, y), times(dy, x))
+        if operator == "max":
+            if apart(x, y):
+                return (x, dx) if x[0] >= y[1] else (y, dy)
+            return greater(x, y), between(dx, dy)
         ratio = mul(x, inverse(y))
         return ratio, times(plus(dx, times(dy, neg(ratio))), inverse(y))
 
@@ -812,13 +836,13 @@ def check_digests(text: str) -> None:
 
 
 def valid_program(program: Any, what: str, *, turning: bool = False) -> dict[str, Any]:
-    """Structure of an operation list: known operators, sines and cosines where allowed, arguments that come earlier."""
+    """Structure of an operation list: known operators, sines and cosines or maxima, arguments that come earlier."""
     need(isinstance(program, dict) and isinstance(program.get("operations"), list), f"{what} must be an operation list")
     operations, arity = (
         program["operations"],
         {"neg": 1, "sq": 1, "sqrt": 1, "tanh": 1, "add": 2, "sub": 2, "mul": 2, "div": 2},
     )
-    arity |= {"sin": 1, "cos": 1} if turning else {}
+    arity |= {"sin": 1, "cos": 1} if turning else {"max": 2}
     need(0 < len(operations) <= MAX_OPERATIONS, f"{what} must have 1 to {MAX_OPERATIONS} operations")
     clean: list[list[Any]] = []
     for k, entry in enumerate(operations):
@@ -3498,7 +3522,7 @@ def _input_of(claim: Claim, row: int) -> int:
 
 def float_apply(operator: str, a: float, b: float = 0.0) -> float:
     """Operations in floats."""
-    simple = {"add": a + b, "sub": a - b, "mul": a * b, "neg": -a, "sq": a * a}
+    simple = {"add": a + b, "sub": a - b, "mul": a * b, "neg": -a, "sq": a * a, "max": max(a, b)}
     if operator in simple:
         return simple[operator]
     if operator in ("sin", "cos"):
@@ -3539,6 +3563,11 @@ def effects_of(claim: Claim, ranges: dict[str, Interval]) -> dict[str, Fraction]
             seen = max(seen, *(abs(a - b) / s for a, b, s in zip(one, other, size, strict=True)))
         found[name] = Fraction(seen)
     return found
+
+
+def mirrored(ranges: dict[str, Interval]) -> dict[str, Interval]:
+    """Where every state has its other sign: a backlash is felt there whose contact never opens in the certified set."""
+    return {name: (-high, -low) for name, (low, high) in ranges.items()}
 
 
 def _clipped(low: Fraction, high: Fraction, share: float) -> float:
@@ -3632,13 +3661,18 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Impulse]:
     ranges |= {name: symmetric(loop.size(name, box, resting=False)) for name in claim.inputs}
     effects = effects_of(claim, ranges)
     spare = {name: v / (LEAST_LOAD if name in claim.disturbances else LEAST_EFFECT) for name, v in effects.items()}
+    unfelt = [name for name in claim.parameters if spare.get(name, 1) < 1]
+    other = effects_of(claim, mirrored(ranges)) if unfelt else {}
+    idle = [name for name in unfelt if other[name] >= LEAST_EFFECT]
+    spare = {name: share for name, share in spare.items() if name not in idle}
+    beyond = "".join(f", {name} where the certified set does not reach" for name in idle)
     weakest = min(spare, key=spare.__getitem__, default="")
     loads = "".join(
         f"{name} moves its row by {percent(effects[name], up=False)}, "
         for name in claim.disturbances
         if name in effects
     )
-    statement = f"the plant feels everything that the study states: {loads}{weakest} is felt least"
+    statement = f"the plant feels everything that the study states: {loads}{weakest} is felt least{beyond}"
     margin = min(spare.values(), default=Fraction(2)) - 1
     state("plant", statement, margin, "1", f"a plant that feels {weakest}")
     span = claim.reference[0]

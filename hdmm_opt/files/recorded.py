@@ -78,6 +78,7 @@ def _values(program: Mapping[str, Any], symbols: Mapping[str, Any]) -> list[Any]
     operators = {
         "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
         "neg": lambda a: -a, "sq": lambda a: a * a, "sqrt": ca.sqrt, "tanh": ca.tanh, "sin": ca.sin, "cos": ca.cos,
+        "max": ca.fmax,
     }  # fmt: skip
     expression = Expression(
         inputs=tuple(program["inputs"]), operations=tuple(map(tuple, program["operations"])),

@@ -10,6 +10,10 @@ The first two states are those of the side of the sensor; the other side follows
 s_l l of screw and gear are those of load and friction: what the spring's force is more is left out of them. In the
 motion that is asked for the spring carries the load and the inertia of the nominal mass. Written like this, a proof
 needs the ratio of mass and stiffness, which decides the mode's frequency, and neither of both alone.
+
+With backlash b, s counts from the contact through which a positive load is carried, and s + T s' becomes
+max(s + T s', 0) - max(-s - b - T s', 0): both flanks push and none pulls. Where a load keeps the contact, as a crane's
+weight does, that is s + T s' again, and so it is in a proof; where it may open, a proof finds a spring of no stiffness.
 """
 
 from __future__ import annotations
@@ -42,14 +46,16 @@ SPRING = {
         loss=True, value=5e-4, unit="s", tolerance=0.2, meaning="damping of screw, nut and bearings over stiffness"
     ),
 }
+#: What a study may add.
+PLAY = {"backlash": Parameter(value=0.0, unit="m", tolerance=0.5, meaning="travel of the rod between both flanks")}
 SENSORS = ("motor", "load")
 #: Names of the other side's speed, by the side of the sensor.
 OTHER = {"motor": "rod_speed", "load": "motor_speed"}
 
 
 def defaults(level: str) -> dict[str, Parameter]:
-    """The parameters with units, tolerances and sources."""
-    return {**parameters_of(level), **SPRING}
+    """The parameters with units, tolerances and sources, those included that a study may add."""
+    return {**parameters_of(level), **SPRING, **PLAY}
 
 
 def elastic_emla(
@@ -69,9 +75,9 @@ def elastic_emla(
 
     References:
         Heydari Shahna (2025), publication P-2, for motor and screw; Ellis (2012) for feedback at the motor and at
-        the load of a drive of two masses.
+        the load of a drive of two masses; Nordin and Gutman (2002) for backlash with a shaft that yields.
 
-    Not guaranteed: backlash and further modes are not modelled; the losses of the screw do not follow the spring's
+    Not guaranteed: further modes are not modelled; the losses of the screw do not follow the spring's
         force. With the sensor at the motor a proof is about the motor's side: the rod is `stretch` away from it.
     """
     import casadi as ca
@@ -80,7 +86,7 @@ def elastic_emla(
     x, u, w, p, q = symbols(5, 1, known)
     r, torque, k = transmission(q), q["torque_scale"] * x[2], q["stiffness"]
     turning, rod = (x[1], x[4]) if sensor == "motor" else (x[4], x[1])
-    beyond = x[3] - w[0] / k + q["spring_damping"] * (turning - rod)
+    beyond = _carried(x[3] + q["spring_damping"] * (turning - rod), q) - w[0] / k
     steady = w[0] + friction_of(turning, q)
     lost = r * (screw_loss(steady, turning, q) * steady)
     driving = torque - q["viscous_friction"] * (turning / r) - r * steady - lost - r * (k * beyond)
@@ -109,9 +115,16 @@ def elastic_emla(
     )  # fmt: skip
 
 
+def _carried(stretch: Any, q: Mapping[str, Any]) -> Any:
+    """What the spring carries over its stiffness, m: through backlash it pushes with either flank and never pulls."""
+    import casadi as ca
+
+    return ca.fmax(stretch, 0) - ca.fmax(-stretch - q["backlash"], 0) if "backlash" in q else stretch
+
+
 def _effort(plant: Plant, loads: Sequence[float]) -> tuple[Any, Any]:
     """What a motion asks of the motor where the screw is rigid."""
-    own = {name: p for name, p in plant.parameters.items() if name not in SPRING}
+    own = {name: p for name, p in plant.parameters.items() if name not in {**SPRING, **PLAY}}
     return EFFORTS.of(pmsm_emla(plant.level, own, dict(plant.ratings)), loads)
 
 

@@ -14,7 +14,7 @@ from .parameter import SOURCES, Parameter
 from .plant import Plant
 
 #: Operations that the prover and the checker bound in a plant, as users know them.
-BOUNDED = ("add", "sub", "mul", "div", "neg", "sq", "sqrt", "tanh", "input", "const")
+BOUNDED = ("add", "sub", "mul", "div", "neg", "sq", "sqrt", "tanh", "max", "input", "const")
 #: Units of a first state.
 FIRST = {"position": ("m", "rad"), "speed": ("m/s", "rad/s")}
 
@@ -116,7 +116,7 @@ def _check_operations(plant: Plant) -> None:
     program, other = program_of(plant, ca.vertcat(plant.mass, plant.force))
     if program is None or other:
         raise _wrong(
-            f"the prover bounds + - * / squares, square roots and tanh: got {other[0]}", "rewrite it with those"
+            f"the prover bounds + - * / squares, square roots, tanh and max: got {other[0]}", "rewrite it with those"
         )
     unread = [name for name in (*plant.disturbances, *plant.parameters) if name not in program.inputs]
     if unread:

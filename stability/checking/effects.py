@@ -1,7 +1,8 @@
 """Whether a plant and a coupling feel what the study states.
 
 Two floats that differ are a witness that they do; nothing is proved of how much. Obligation: plant. Must fail: a
-plant that multiplies its load by 0, a parameter without effect, a machine that is the same for every payload.
+plant that multiplies its load by 0, a parameter without effect in the set and in its mirror image, a machine that is
+the same for every payload.
 """
 
 from __future__ import annotations
@@ -47,6 +48,11 @@ def effects_of(claim: Claim, ranges: dict[str, Interval]) -> dict[str, Fraction]
             seen = max(seen, *(abs(a - b) / s for a, b, s in zip(one, other, size, strict=True)))
         found[name] = Fraction(seen)
     return found
+
+
+def mirrored(ranges: dict[str, Interval]) -> dict[str, Interval]:
+    """Where every state has its other sign: a backlash is felt there whose contact never opens in the certified set."""
+    return {name: (-high, -low) for name, (low, high) in ranges.items()}
 
 
 def _clipped(low: Fraction, high: Fraction, share: float) -> float:

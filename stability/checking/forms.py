@@ -124,6 +124,10 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
             return table.node(key, plus(a.form, b.form), add(a.range, b.range))
         if operator == "sub":
             return table.node(key, plus(a.form, times(b.form, neg(ONE))), add(a.range, neg(b.range)))
+        if operator == "max":
+            if apart(a.range, b.range):
+                return a if a.range[0] >= b.range[1] else b
+            return table.fresh(key, between(a.form, b.form), greater(a.range, b.range))
         if operator == "div":
             form, natural = times(a.form, inverse(b.range)), mul(a.range, inverse(b.range))
             return (table.node if set(b.form) <= {""} else table.fresh)(key, form, natural)
@@ -141,6 +145,21 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
 
     entries = walk(program, inputs.__getitem__, const, apply)
     return [entries[i] for i in program["outputs"]]
+
+
+def greater(a: Interval, b: Interval) -> Interval:
+    """Range of the larger of two numbers."""
+    return max(a[0], b[0]), max(a[1], b[1])
+
+
+def apart(a: Interval, b: Interval) -> bool:
+    """Whether ranges decide which of two numbers is the larger."""
+    return a[0] >= b[1] or b[0] >= a[1]
+
+
+def between(a: Form, b: Form) -> Form:
+    """All forms between two: max(a, b) = b + s (a - b) with s from 0 to 1."""
+    return plus(b, times(plus(a, times(b, neg(ONE))), (Fraction(0), Fraction(1))))
 
 
 def outside(form: Form) -> bool:
@@ -171,6 +190,10 @@ def derivative(program: dict[str, Any], ranges: dict[str, Interval], tangents: d
             return add(x, neg(y)), plus(dx, times(dy, neg(ONE)))
         if operator == "mul":
             return mul(x, y), plus(times(dx, y), times(dy, x))
+        if operator == "max":
+            if apart(x, y):
+                return (x, dx) if x[0] >= y[1] else (y, dy)
+            return greater(x, y), between(dx, dy)
         ratio = mul(x, inverse(y))
         return ratio, times(plus(dx, times(dy, neg(ratio))), inverse(y))
 

@@ -76,7 +76,7 @@ def _input_of(claim: Claim, row: int) -> int:
 
 def float_apply(operator: str, a: float, b: float = 0.0) -> float:
     """Operations in floats."""
-    simple = {"add": a + b, "sub": a - b, "mul": a * b, "neg": -a, "sq": a * a}
+    simple = {"add": a + b, "sub": a - b, "mul": a * b, "neg": -a, "sq": a * a, "max": max(a, b)}
     if operator in simple:
         return simple[operator]
     if operator in ("sin", "cos"):

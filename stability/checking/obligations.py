@@ -10,7 +10,7 @@ from fractions import Fraction
 
 from .arithmetic import symmetric
 from .claim import Claim
-from .effects import effects_of
+from .effects import effects_of, mirrored
 from .impulse import Impulse
 from .limits import LEAST_EFFECT, LEAST_LOAD, ROUNDING, NotProvedError
 from .loop import Loop
@@ -68,13 +68,18 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Impulse]:
     ranges |= {name: symmetric(loop.size(name, box, resting=False)) for name in claim.inputs}
     effects = effects_of(claim, ranges)
     spare = {name: v / (LEAST_LOAD if name in claim.disturbances else LEAST_EFFECT) for name, v in effects.items()}
+    unfelt = [name for name in claim.parameters if spare.get(name, 1) < 1]
+    other = effects_of(claim, mirrored(ranges)) if unfelt else {}
+    idle = [name for name in unfelt if other[name] >= LEAST_EFFECT]
+    spare = {name: share for name, share in spare.items() if name not in idle}
+    beyond = "".join(f", {name} where the certified set does not reach" for name in idle)
     weakest = min(spare, key=spare.__getitem__, default="")
     loads = "".join(
         f"{name} moves its row by {percent(effects[name], up=False)}, "
         for name in claim.disturbances
         if name in effects
     )
-    statement = f"the plant feels everything that the study states: {loads}{weakest} is felt least"
+    statement = f"the plant feels everything that the study states: {loads}{weakest} is felt least{beyond}"
     margin = min(spare.values(), default=Fraction(2)) - 1
     state("plant", statement, margin, "1", f"a plant that feels {weakest}")
     span = claim.reference[0]

@@ -99,13 +99,13 @@ def check_digests(text: str) -> None:
 
 
 def valid_program(program: Any, what: str, *, turning: bool = False) -> dict[str, Any]:
-    """Structure of an operation list: known operators, sines and cosines where allowed, arguments that come earlier."""
+    """Structure of an operation list: known operators, sines and cosines or maxima, arguments that come earlier."""
     need(isinstance(program, dict) and isinstance(program.get("operations"), list), f"{what} must be an operation list")
     operations, arity = (
         program["operations"],
         {"neg": 1, "sq": 1, "sqrt": 1, "tanh": 1, "add": 2, "sub": 2, "mul": 2, "div": 2},
     )
-    arity |= {"sin": 1, "cos": 1} if turning else {}
+    arity |= {"sin": 1, "cos": 1} if turning else {"max": 2}
     need(0 < len(operations) <= MAX_OPERATIONS, f"{what} must have 1 to {MAX_OPERATIONS} operations")
     clean: list[list[Any]] = []
     for k, entry in enumerate(operations):

@@ -138,6 +138,7 @@ def evaluate(expression: Expression, inputs: Mapping[str, Value], symbols: Symbo
         "sq": lambda a: algebra.mul(a, a),
         "sqrt": lambda a: algebra.bounded("sqrt", a, a.range.sqrt()),
         "tanh": lambda a: algebra.bounded("tanh", a, a.range.tanh()),
+        "max": algebra.larger,
     }
 
     def const(number: float) -> Value:
@@ -178,6 +179,13 @@ class _Algebra:
         key, form, natural = self.symbols.key("div", a.key, b.key), a.form.scaled(ONE / b.range), a.range / b.range
         return self._value(key, form, natural) if b.form.is_constant else self.symbols.node(key, form, natural)
 
+    def larger(self, a: Value, b: Value) -> Value:
+        """The larger of two: that one alone where the ranges decide, otherwise anything between both."""
+        if a.range.low >= b.range.high or b.range.low >= a.range.high:
+            return a if a.range.low >= b.range.high else b
+        between = b.form + (a.form - b.form).scaled(Interval(0.0, 1.0))
+        return self.symbols.node(self.symbols.key("max", *sorted((a.key, b.key))), between, a.range.maximum(b.range))
+
     def bounded(self, operator: str, a: Value, bounds: Interval) -> Value:
         return self.symbols.node(self.symbols.key(operator, a.key), Form(constant=bounds), bounds)
 
@@ -211,6 +219,7 @@ def tangent(expression: Expression, ranges: Mapping[str, Interval], tangents: Ma
         "sq": lambda a: _Dual(a.range.square(), a.tangent.scaled(Interval(2.0) * a.range)),
         "sqrt": lambda a: _Dual(a.range.sqrt(), a.tangent.scaled(Interval(0.5) / a.range.sqrt())),
         "tanh": lambda a: _Dual(a.range.tanh(), a.tangent.scaled(_tanh_slope(a.range))),
+        "max": _dual_larger,
     }
     table = run(expression, read, operators, lambda number: _Dual(Interval(number), Form()))
     return table[expression.outputs[0]].tangent
@@ -225,6 +234,13 @@ class _Dual:
 def _dual_quotient(a: _Dual, b: _Dual) -> _Dual:
     ratio = a.range / b.range
     return _Dual(ratio, (a.tangent - b.tangent.scaled(ratio)).scaled(ONE / b.range))
+
+
+def _dual_larger(a: _Dual, b: _Dual) -> _Dual:
+    if a.range.low >= b.range.high or b.range.low >= a.range.high:
+        return a if a.range.low >= b.range.high else b
+    between = b.tangent + (a.tangent - b.tangent).scaled(Interval(0.0, 1.0))
+    return _Dual(a.range.maximum(b.range), between)
 
 
 def _tanh_slope(bounds: Interval) -> Interval:

@@ -55,19 +55,39 @@ STRIBECK = {
 }
 
 
-@pytest.mark.parametrize(("sensor", "values"), [("motor", MOTOR), ("load", LOAD)])
-def test_agrees_with_an_independent_adaptive_integrator(sensor, values):
-    """Two masses, a spring and a law written by hand in the positions of both sides, integrated by SciPy at 1e-10."""
+def played(size):
+    """Backlash as a study gives it."""
+    return {"backlash": {"value": size, "unit": "m", "source": "assumed"}} if size else {}
+
+
+#: A load that stays, and one that turns and takes the contact to the other flank and back.
+HELD, TURNING = ((0.0, 70e3),), ((0.0, 20e3), (0.3, 20e3), (0.7, -10e3), (1.1, -10e3), (1.5, 20e3))
+
+
+@pytest.mark.parametrize(
+    ("sensor", "values", "size", "course"),
+    [
+        ("motor", MOTOR, 0.0, HELD),
+        ("load", LOAD, 0.0, HELD),
+        ("motor", MOTOR, 8e-5, TURNING),
+        ("load", LOAD, 8e-5, TURNING),
+    ],
+)
+def test_agrees_with_an_independent_adaptive_integrator(sensor, values, size, course):
+    """Two masses, a spring, its backlash and a law by hand in the positions of both sides, by SciPy at 1e-10."""
     data = screw(sensor)
-    data["plant"]["parameters"] |= STRIBECK
+    data["plant"]["parameters"] |= STRIBECK | played(size)
     problem = assemble(study_from(data))
     (member,) = problem.members
     gains, q = gains_of(problem, *values), member.plant.values()
-    r, k, load = transmission(q), q["stiffness"], 70e3
+    r, k, flanks = transmission(q), q["stiffness"], set()
 
-    def rates(t, x, u):
+    def rates(t, x, u, load):
         x_m, v_m, x_l, v_l, torque = x
         carried = k * (x_m - x_l + q["spring_damping"] * (v_m - v_l))
+        if size:
+            carried = carried if carried > 0 else min(0.0, carried + k * size)
+            flanks.add(np.sign(carried))
         rubbing = q["coulomb_friction"] + 400.0 / (1 + (v_m / 0.01) ** 2)
         steady = load + rubbing * np.tanh(v_m / q["friction_speed"])
         share = q["screw_friction"] / lead_angle_tangent(q) + q["gear_loss"]
@@ -81,10 +101,10 @@ def test_agrees_with_an_independent_adaptive_integrator(sensor, values):
             (u - torque) / q["drive_lag"],
         ]
 
-    scenario = Scenario(name="still", disturbances={"load_force": ((0.0, load),)}, initial=1.0)
+    scenario = Scenario(name="still", disturbances={"load_force": course}, initial=1.0)
     trace = Loop(problem).trace({member.name: gains}, scenario, duration=1.8).members[member.name]
     seen = trace.x[:2, 0]
-    stretch = load / k  # the spring carries the load at first
+    stretch = course[0][1] / k  # the spring carries the load at first
     x = np.array([seen[0], seen[1], seen[0] - stretch, trace.x[4, 0], trace.x[2, 0]])
     if sensor == "load":
         x = np.array([seen[0] + stretch, trace.x[4, 0], seen[0], seen[1], trace.x[2, 0]])
@@ -103,8 +123,10 @@ def test_agrees_with_an_independent_adaptive_integrator(sensor, values):
         phi += 1e-3 * g["gamma_2"] * q2
         commands.append(u)
         acting = commands[max(0, step - 1)]  # one period of delay
-        x = solve_ivp(rates, (0, 1e-3), x, args=(acting,), rtol=1e-10, atol=1e-13, method="DOP853").y[:, -1]
-    assert np.abs(errors).max() < 2e-8
+        load = np.interp(1e-3 * step, *zip(*course, strict=True))  # loads change with the periods
+        x = solve_ivp(rates, (0, 1e-3), x, args=(acting, load), rtol=1e-10, atol=1e-13, method="DOP853").y[:, -1]
+    assert np.abs(errors).max() < (2e-7 if size else 2e-8)
+    assert not size or flanks == {-1.0, 0.0, 1.0}
     assert trace.x[0].std() > 1e-4  # it moves
 
 
@@ -213,6 +235,41 @@ def test_runs_stay_inside_what_is_proved(proved):
     for figures in Loop(problem).figures(runs):
         assert figures.largest_error_m <= found.half_widths[0]
         assert figures.maximum_error_m <= found.ultimate[0]
+
+
+def loose(low):
+    """The study with little that is uncertain, 0.1 mm of backlash, and a load from so much on."""
+    data = screw(stiffness={"tolerance": 0.03}, load_mass={"tolerance": 0.03}, spring_damping={"tolerance": 0.05})
+    data["plant"]["parameters"] |= played(1e-4)
+    data["uncertainty"]["disturbances"]["load_force"]["range"] = [low, 76e3]
+    return data
+
+
+def test_a_load_that_keeps_the_contact_is_proved_through_backlash():
+    """As if there were none; the checker decides that the contact stays, and refuses a load that lets go of it."""
+    data = loose(30e3)
+    (member,) = (problem := assemble(study_from(data))).members
+    values = gains_of(problem, *MOTOR)
+    found = certificate(member, values)
+    assert not isinstance(found, Failure), found.reason
+    claim = claim_of(member.model, member.bounds, member.gains(values), found, limit=1e30, accuracy=1e30)
+    assert verdict(claim)
+    lighter = {
+        **claim.feedforward,
+        "load_force": ((Fraction(5000), Fraction(76000)), claim.feedforward["load_force"][1]),
+    }
+    assert not verdict(replace(claim, feedforward=lighter))
+    del data["plant"]["parameters"]["backlash"]
+    (rigid,) = (same := assemble(study_from(data))).members
+    without = certificate(rigid, gains_of(same, *MOTOR))
+    assert not isinstance(without, Failure)
+    assert (found.ultimate == without.ultimate).all() and (found.half_widths == without.half_widths).all()
+
+
+def test_a_contact_that_may_open_is_not_proved():
+    problem = assemble(study_from(loose(5e3)))
+    found = certificate(problem.members[0], gains_of(problem, *MOTOR))
+    assert isinstance(found, Failure) and "small gain" in found.reason
 
 
 def test_the_bundled_file_says_what_the_spring_does():

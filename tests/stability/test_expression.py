@@ -1,12 +1,16 @@
+from fractions import Fraction
+
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hdmm_opt.control import RAC
 from hdmm_opt.plants import pmsm_emla
 from stability import Interval, enclose, from_casadi
+from stability.checking.arithmetic import WORK
+from stability.checking.forms import Node, Table, derivative, linear
 from stability.enclosures.form import Form, Symbols, evaluate, tangent
 
 
@@ -80,6 +84,42 @@ def test_what_the_law_cancels_cancels_in_the_form():
     inputs |= {"h": symbols.constant(Interval(0.002, 0.002), "h"), "h_hat": symbols.constant(Interval(0.002), "")}
     value = evaluate(expression, inputs, symbols)[0]
     assert value.range.magnitude == pytest.approx(0.1 * 50, rel=1e-9)
+
+
+@settings(max_examples=60)
+@given(st.lists(st.floats(-3, 3), min_size=4, max_size=4), st.lists(st.floats(0, 1), min_size=2, max_size=2))
+def test_the_larger_of_two_is_one_of_them_or_lies_between(ends, shares):
+    """Prover and checker, values and derivatives; where the ranges decide, the form is that of the larger alone."""
+    expression = from_casadi(function(lambda x, y: [ca.fmax(2 * x - y, x) + y], 2), ("x", "y"))
+    boxes = {n: Interval(*sorted(ends[2 * k : 2 * k + 2])) for k, n in enumerate(("x", "y"))}
+    x, y = (b.low + s * (b.high - b.low) for b, s in zip(boxes.values(), shares, strict=True))
+    exact = max(2 * x - y, x) + y
+    a, b = Interval(2.0) * boxes["x"] - boxes["y"], boxes["x"]
+    assume(min(abs(a.low - b.high), abs(b.low - a.high)) > 1e-6)  # where rounding decides, either is right
+    symbols = Symbols(ranges=dict(boxes))
+    (value,) = evaluate(expression, {n: symbols.value(n, Form.of(n)) for n in boxes}, symbols)
+    form = symbols.expand(value.form)
+    at = form.constant + form.coefficient("x") * Interval(x) + form.coefficient("y") * Interval(y)
+    assert value.range.low - 1e-9 <= exact <= value.range.high + 1e-9
+    assert at.low - 1e-9 <= exact <= at.high + 1e-9
+    program = {"operations": [list(o) for o in expression.operations], "outputs": list(expression.outputs)}
+    ranges = {n: (Fraction(b.low), Fraction(b.high)) for n, b in boxes.items()}
+    WORK.begin(10**6)
+    table = Table(ranges={"": (Fraction(1), Fraction(1)), **ranges})
+    node = linear(
+        program, {n: Node(table.key("input", n), {n: table.ranges[""]}, r) for n, r in ranges.items()}, table
+    )[0]
+    checked = {n: table.expand(node.form).get(n, (Fraction(0),) * 2) for n in boxes}
+    for n in boxes:
+        found = form.coefficient(n)
+        assert found.low == pytest.approx(float(checked[n][0]), abs=1e-9)
+        assert found.high == pytest.approx(float(checked[n][1]), abs=1e-9)
+    slope = derivative(program, ranges, {"x": {"": table.ranges[""]}})[""]
+    moved = tangent(expression, boxes, {"x": Form(constant=Interval(1.0))}).constant
+    assert (moved.low, moved.high) == pytest.approx(tuple(map(float, slope)))
+    assert slope[0] <= (2 if x > y else 1) <= slope[1]
+    if a.low > b.high:
+        assert checked["x"] == (2, 2) == slope and checked["y"] == (0, 0)
 
 
 @settings(max_examples=40)

@@ -106,7 +106,7 @@ HOSTILE = {
     "slices halved five times": lambda: crane(5),
     "slices halved eight times": lambda: crane(8),
     **{f"a chain of {operator}": lambda operator=operator: chain(operator)
-       for operator in ("tanh", "sq", "mul", "add", "div", "neg", "sqrt")},
+       for operator in ("tanh", "sq", "mul", "add", "div", "neg", "sqrt", "max")},
     "moves of 900 spans": lambda: long_reference(900),
     "control points of 290 digits": lambda: with_digits(290),
     "control points of 55 digits": lambda: with_digits(55),
