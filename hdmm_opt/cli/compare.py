@@ -37,9 +37,8 @@ def run(name: str, output: Path | None, report: Path | None, options: Options, a
     from ..files.comparison import COMPARISON_NAME, gains_text, write_comparison
     from ..files.report import check_report
     from ..files.seal import to_text
-    from ..files.sources import assumed_text
     from ..files.text import check_writable, prepared_folder, write_text
-    from ..jobs.challenges import challenges
+    from ..jobs.challenges import assumed_of, challenges
     from ..jobs.compare import compare, table
     from ..jobs.evaluation import cost_scenarios
     from ..jobs.options import effort_of
@@ -69,12 +68,12 @@ def run(name: str, output: Path | None, report: Path | None, options: Options, a
     )
     for c in found:
         click.echo(f"{c.name}, first seed: {gains_text(c)}", err=True)
-    click.echo(f"assumed, to be replaced by yours: {assumed_text(problem)}", err=True)
+    click.echo(f"assumed, to be replaced by yours: {assumed_of(problem)}", err=True)
     if output is not None:
         write_text(output, to_text(_data(study, found)))
         click.echo(str(output))
     if report is not None:
-        click.echo(str(write_comparison(problem, found, tuned, proved, report)))
+        click.echo(str(write_comparison(problem, found, tuned, proved, assumed_of(problem), report)))
     return PROVED
 
 

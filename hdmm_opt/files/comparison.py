@@ -9,7 +9,6 @@ from typing import Any
 
 from ..problem import Problem
 from .page import HEAD
-from .sources import assumed_text
 from .text import upward, write_text
 
 #: Name of the page in its folder.
@@ -49,7 +48,9 @@ largest share used. Travel: total variation of the input. Simulation proves noth
 )
 
 
-def write_comparison(problem: Problem, found: Sequence[Any], tuned: str, inside: Sequence[str], folder: Path) -> Path:
+def write_comparison(
+    problem: Problem, found: Sequence[Any], tuned: str, inside: Sequence[str], assumed: str, folder: Path
+) -> Path:  # fmt: skip
     """Write `comparison.html`, which needs nothing beside itself.
 
     Args:
@@ -57,6 +58,7 @@ def write_comparison(problem: Problem, found: Sequence[Any], tuned: str, inside:
         found: The controllers (`jobs/compare.py`), the law first.
         tuned: How they were tuned, as the beginning of a sentence.
         inside: Names of the scenarios inside the assumptions.
+        assumed: What has no public source.
         folder: An existing folder.
 
     Returns:
@@ -71,7 +73,7 @@ def write_comparison(problem: Problem, found: Sequence[Any], tuned: str, inside:
         bound=None if bound is None else f"{upward(1e3 * bound)} {unit}", decades=int(DECADES),
         runs=[_run(name, found, inside) for name in found[0].trials[0].figures],
         tunings=[{"name": c.name, "gains": gains_text(c)} for c in found],
-        assumed=assumed_text(problem),
+        assumed=assumed,
     )  # fmt: skip
     target = folder / COMPARISON_NAME
     write_text(target, text)

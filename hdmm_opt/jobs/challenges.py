@@ -7,12 +7,17 @@ from dataclasses import replace
 
 from trajectories import Reference, constant
 
+from ..files.sources import assumed_text
 from ..plants import Parameter
-from ..problem import Problem
+from ..plants.elastic_emla import SENSORS, SPRING
+from ..problem import Problem, assemble
 from ..simulation import Scenario, scenarios
+from ..study import validated
 
 #: Parameters that stand for the gain of the plant and for the lag of its drive, and values that they are tried at.
 GAIN, LAG, SLOW = "torque_scale", "drive_lag", 1e-3
+#: A rigid actuator, and the one with a spring in its screw that stands for it, the sensor at either side.
+RIGID, ELASTIC = ("pmsm_emla", "torque"), "elastic_emla"
 #: So many times the assumed initial error.
 FAR = 10.0
 
@@ -30,17 +35,53 @@ def challenges(problem: Problem, seed: int) -> list[Scenario]:
 
 
 def grounds(problem: Problem, seed: int) -> list[tuple[Problem, list[Scenario]]]:
-    """What tuned controllers are scored on: the challenges; a period more of delay; a rest, with noise alone."""
+    """What tuned controllers are scored on, each with the problem in which it runs.
+
+    Args:
+        problem: The problem.
+        seed: Seed of the noise.
+
+    Returns:
+        The challenges; a period more of delay; a rest, with noise alone; and of a rigid actuator under a torque the
+        same one with a screw that is a spring of assumed stiffness, with the sensor at the motor and at the rod.
+    """
     late = tuple(m.under(replace(m.bounds, delay=m.bounds.delay + m.bounds.period)) for m in problem.members)
     still = tuple(
         replace(m, reference=Reference(segments=(constant(float(m.reference(0.0)[0, 0]), 0.0, problem.duration),)))
         for m in problem.members
     )
-    noisy = [Scenario(name=name, noise=1.0, seed=seed + k) for k, name in enumerate(("late", "noise-only"), 4)]
+    late_run, still_run, *sprung = (
+        Scenario(name=name, noise=1.0, seed=seed + k)
+        for k, name in enumerate(("late", "noise-only", "spring-at-motor", "spring-at-load"), 4)
+    )
     return [
-        (problem, challenges(problem, seed)), (replace(problem, members=late), noisy[:1]),
-        (replace(problem, members=still), noisy[1:]),
+        (problem, challenges(problem, seed)), (replace(problem, members=late), [late_run]),
+        (replace(problem, members=still), [still_run]),
+        *((ground, [run]) for ground, run in zip(_elastic(problem), sprung, strict=False)),
     ]  # fmt: skip
+
+
+def assumed_of(problem: Problem) -> str:
+    """What of a comparison has no public source, in one line: of the machine, and of the springs it is tried on."""
+    text, spring = assumed_text(problem), "stiffness"
+    if _rigid(problem):
+        text += f", {spring} of the screw where it is a spring ({SPRING[spring].value:g} {SPRING[spring].unit})"
+    return text
+
+
+def _rigid(problem: Problem) -> bool:
+    plant = problem.study.plant
+    return (plant.model, plant.level) == RIGID
+
+
+def _elastic(problem: Problem) -> Iterator[Problem]:
+    """The problem with a screw that is a spring; the laws keep what they know of the plant."""
+    if _rigid(problem):
+        for sensor in SENSORS:
+            data = problem.study.model_dump(mode="json", exclude_none=True)
+            data["plant"] |= {"model": ELASTIC, "sensor": sensor}
+            data["controller"]["modelling"] = []  # what a law foresees, it foresees of its own plant
+            yield assemble(validated(data, problem.study.study.name))
 
 
 def _more(problem: Problem, seed: int) -> Iterator[Scenario]:

@@ -15,6 +15,7 @@ from tuning import Budget, Outcome
 from tuning import search as run_search
 
 from ..control import GainSpec
+from ..control.fitted import fitted
 from ..control.rivals.cascade import Cascade
 from ..control.rivals.registry import rivals
 from ..errors import InvalidInputError
@@ -146,7 +147,11 @@ class _Score:
     """Runs of one kind of controller on all that tuned ones are scored on."""
 
     def __init__(self, problem: Problem, laws: Sequence[Cascade] | None, seed: int) -> None:
-        self.loops = [(Loop(ground, laws=laws), chosen) for ground, chosen in grounds(problem, seed)]
+        base = laws or [member.law for member in problem.members]
+        self.loops = [
+            (Loop(ground, laws=[fitted(law, m.plant) for law, m in zip(base, ground.members, strict=True)]), chosen)
+            for ground, chosen in grounds(problem, seed)
+        ]
 
     def of(self, gains: GainSet) -> dict[str, Figures]:
         """Figures by scenario."""

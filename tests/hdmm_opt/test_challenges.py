@@ -1,16 +1,18 @@
 """What tuned controllers are scored on."""
 
+import numpy as np
 import pytest
 from machines import emla, quick_arm, study_from
 
 from hdmm_opt import study
+from hdmm_opt.control.fitted import fitted
 from hdmm_opt.files.comparison import write_comparison
 from hdmm_opt.jobs.certify import strongest
-from hdmm_opt.jobs.challenges import challenges, grounds
+from hdmm_opt.jobs.challenges import assumed_of, challenges, grounds
 from hdmm_opt.jobs.compare import _bound, compare
 from hdmm_opt.jobs.options import Options, Progress
 from hdmm_opt.problem import assemble
-from hdmm_opt.simulation import within_assumptions
+from hdmm_opt.simulation import Loop, Run, Scenario, within_assumptions
 from stability import Failure
 
 
@@ -41,13 +43,41 @@ def test_seeds_of_the_noise_are_those_asked_for():
 
 def test_a_period_more_and_a_rest_are_grounds_of_their_own():
     problem = assemble(study_from(emla("emla-p2")))
-    (_, whole), (late, (later,)), (still, (noisy,)) = grounds(problem, 1)
+    (_, whole), (late, (later,)), (still, (noisy,)), *sprung = grounds(problem, 1)
     (member,), (slow,), (resting,) = problem.members, late.members, still.members
     assert [s.name for s in whole] == [s.name for s in challenges(problem, 1)]
     assert slow.bounds.delay == member.bounds.delay + member.bounds.period and later.name == "late"
     ends = resting.reference.bounds()
     assert noisy.name == "noise-only" and ends[0][0] == ends[0][1] == member.reference(0.0)[0, 0]
     assert ends[1][0] == ends[1][1] == 0 and still.duration == problem.duration
+    assert [(p.study.plant.sensor, run.name) for p, (run,) in sprung] == [
+        ("motor", "spring-at-motor"), ("load", "spring-at-load")
+    ]  # fmt: skip
+    assert len(grounds(assemble(study_from(quick_arm())), 1)) == 3  # no joint of a rigid arm
+
+
+@pytest.mark.parametrize("name", ["emla-p2", "emla-p4-ramp"])
+def test_a_law_keeps_what_it_knows_on_a_plant_with_more_states(name):
+    """On a screw that hardly yields, the law of the rigid one does what it does on the rigid one."""
+    data = emla(name)
+    problem = assemble(study_from(data))
+    stiff = {"value": 1e12, "unit": "N/m", "tolerance": 0.0, "source": "assumed"}
+    damped = {"value": 1e-3, "unit": "s", "tolerance": 0.0, "source": "assumed"}
+    data["plant"] |= {"model": "elastic_emla", "sensor": "load"}
+    data["plant"]["parameters"] |= {"stiffness": stiff, "spring_damping": damped}
+    data["controller"]["modelling"] = []
+    yielding = assemble(study_from(data))
+    (member,), (soft,) = problem.members, yielding.members
+    given = {"beta_1": 40.0, "beta_2": 12000.0, "gamma_2": 2e5}
+    run = Run(gains={member.name: tuple(given.get(i.name, i.low) for i in member.ranges)}, scenario=Scenario(name="x"))
+    rigid = Loop(problem).trace(run.gains, run.scenario, duration=3.0).members[member.name]
+    moved = Loop(yielding, laws=[fitted(member.law, soft.plant)]).trace(run.gains, run.scenario, duration=3.0)
+    own = moved.members[member.name]
+    assert own.x[0, -1] - own.x[0, 0] > 1e-3
+    assert np.abs(own.x[0] - rigid.x[0]).max() < 2e-6
+    assert fitted(member.law, member.plant) is member.law
+    with pytest.raises(ValueError, match="does not begin with the states"):
+        fitted(soft.law, assemble(study_from(quick_arm())).members[0].plant)
 
 
 def test_a_comparison_is_the_same_twice_and_its_page_stands_by_itself(tmp_path):
@@ -57,10 +87,14 @@ def test_a_comparison_is_the_same_twice_and_its_page_stands_by_itself(tmp_path):
         [(t.gains, {k: m.to_data() for k, m in t.figures.items()}) for c in f for t in c.trials] for f in (found, again)
     ]
     assert told[0] == told[1]
-    page = write_comparison(problem, found, "Tuned a little", ["heavy"], tmp_path).read_text(encoding="utf-8")
+    page = write_comparison(problem, found, "Tuned a little", ["heavy"], assumed_of(problem), tmp_path).read_text(
+        encoding="utf-8"
+    )
     assert all(f"<h2>{name}</h2>" in page for name in found[0].trials[0].figures)
     assert page.count('class="best"') == len(found[0].trials[0].figures)
-    assert "http" not in page and "src=" not in page and "load_mass" in page  # nothing from elsewhere; what is assumed
+    assert (
+        "http" not in page and "src=" not in page and "load_mass" in page and "stiffness of the screw" in page
+    )  # nothing from elsewhere; what is assumed
     assert "inside the assumptions" in page and "{{" not in page
 
 
