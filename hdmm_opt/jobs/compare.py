@@ -26,7 +26,7 @@ from ..files.text import upward
 from ..problem import GainSet, Problem
 from ..problem.margins import certified_error, violation
 from ..simulation import Figures, Loop, Run
-from .certify import strongest
+from .certify import refinable, strongest
 from .challenges import grounds
 from .evaluation import cost_scenarios, simulated_cost
 from .options import Options, Progress
@@ -99,7 +99,7 @@ def compare(
         problem: The problem.
         budget: Population, and evaluations of each candidate of the population, the same for all.
         seed: First seed of the searches.
-        options: Workers of the law's search.
+        options: Workers of the law's search, and threads of the runs of all others.
         progress: Where to report.
         seeds: Searches of each controller.
 
@@ -123,14 +123,16 @@ def compare(
     for number in numbers:
         progress.stage(f"{law}, seed {number}")
         state = State(None, {}, resume=False)
-        trials.append(_law(loop, search(problem, first, METHOD, budget, number, options, state, progress), score))
+        fine = refinable(problem)
+        tuned = search(problem, first, METHOD, budget, number, options, state, progress, refine=fine)
+        trials.append(_law(loop, tuned, score))
     found = [Contender(name=law, trials=tuple(trials))]
 
     def contend(name: str, simulated: _Simulated) -> None:
         made = []
         for number in numbers:
             progress.stage(f"{name}, seed {number}")
-            made.append(simulated.tuned(budget, number, progress))
+            made.append(simulated.tuned(budget, number, options.jobs, progress))
         found.append(Contender(name=name, trials=tuple(made)))
 
     contend(f"{law}{UNPROVED}", _Simulated(problem, None, seed))
@@ -198,14 +200,15 @@ class _Simulated:
         """A certified bound, m, where the gains happen to have one."""
         return _bound(self.problem, gains)
 
-    def tuned(self, budget: tuple[int, int], seed: int, progress: Progress) -> Trial:
+    def tuned(self, budget: tuple[int, int], seed: int, jobs: int, progress: Progress) -> Trial:
         """What a search from the middle of its ranges finds."""
         problem, chosen = self.problem, cost_scenarios(self.problem)
         population, rounds = budget
         allowed = Budget(evaluations=population * (rounds + 1), seconds=problem.study.tuning.seconds or math.inf)
 
         def evaluate(points: Sequence[Array]) -> list[Outcome]:
-            shown = self.loop.figures([Run(gains=self.gains(p), scenario=s) for p in points for s in chosen])
+            runs = [Run(gains=self.gains(p), scenario=s) for p in points for s in chosen]
+            shown = self.loop.figures(runs, jobs=jobs)
             return [_outcome(problem, shown[k : k + len(chosen)]) for k in range(0, len(shown), len(chosen))]
 
         def after(now: Any) -> None:

@@ -86,7 +86,9 @@ def elastic_emla(
     x, u, w, p, q = symbols(5, 1, known)
     r, torque, k = transmission(q), q["torque_scale"] * x[2], q["stiffness"]
     turning, rod = (x[1], x[4]) if sensor == "motor" else (x[4], x[1])
-    beyond = _carried(x[3] + q["spring_damping"] * (turning - rod), q) - w[0] / k
+    beyond = x[3] - w[0] / k + q["spring_damping"] * (turning - rod)
+    if "backlash" in q:
+        beyond = _carried(x[3] + q["spring_damping"] * (turning - rod), q["backlash"]) - w[0] / k
     steady = w[0] + friction_of(turning, q)
     lost = r * (screw_loss(steady, turning, q) * steady)
     driving = torque - q["viscous_friction"] * (turning / r) - r * steady - lost - r * (k * beyond)
@@ -115,11 +117,11 @@ def elastic_emla(
     )  # fmt: skip
 
 
-def _carried(stretch: Any, q: Mapping[str, Any]) -> Any:
-    """What the spring carries over its stiffness, m: through backlash it pushes with either flank and never pulls."""
+def _carried(stretch: Any, backlash: Any) -> Any:
+    """What the spring carries over its stiffness, m: it pushes with either flank and never pulls."""
     import casadi as ca
 
-    return ca.fmax(stretch, 0) - ca.fmax(-stretch - q["backlash"], 0) if "backlash" in q else stretch
+    return ca.fmax(stretch, 0) - ca.fmax(-stretch - backlash, 0)
 
 
 def _effort(plant: Plant, loads: Sequence[float]) -> tuple[Any, Any]:
