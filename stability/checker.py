@@ -2174,7 +2174,9 @@ class Loop:
         return plus({}, *(times(self._signal(name), (share, share)) for name, share in placed(target).items()))
 
     def _signal(self, name: str) -> Form:
-        """A derivative of the reference; or a disturbance, its middle where its rate has no bound."""
+        """A derivative of the reference, one; or a disturbance, its middle where its rate has no bound."""
+        if name == "constant":
+            return {"": ONE}
         if name in ("r0", "r1", "r2"):
             return {name: ONE}
         if name in self.rated:

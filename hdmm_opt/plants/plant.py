@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
+from stability.loops.model import CONSTANT
+
 from .parameter import Parameter
 
 
@@ -61,7 +63,8 @@ class Plant:
         parameters: Parameters by name.
         targets: For each state what it tracks: "reference", "zero", the index of the row whose virtual control is its
             target, or, where the law does not act, coefficients of r0, r1, r2 (reference, its rate, its acceleration),
-            "DISTURBANCE" and "DISTURBANCE/PARAMETER": their sum is the state's value in the motion that is asked for.
+            "constant" (1), "DISTURBANCE" and "DISTURBANCE/PARAMETER": their sum is the state's value in the motion
+            that is asked for.
         controlled: For each state whether the law acts in its row. Shape (n,).
         input_map: For each input the row whose virtual control it is. Shape (m,).
         x, u, w, p: The symbols (CasADi SX columns) of states, inputs, disturbances and parameters.
@@ -174,8 +177,8 @@ class Plant:
     def standing(self, loads: Sequence[float]) -> list[float]:
         """The state that rests in the middle of the stroke under some disturbances, at nominal parameters."""
         values = self.values()
-        acting = dict(zip(self.disturbances, loads, strict=True))
-        acting |= {f"{load}/{name}": w / v for load, w in acting.items() for name, v in values.items() if v}
+        acting = {CONSTANT: 1.0, **dict(zip(self.disturbances, loads, strict=True))}
+        acting |= {f"{load}/{name}": acting[load] / v for load in self.disturbances for name, v in values.items() if v}
         place = sum(self.stroke) / 2 if self.first == "position" else 0.0
         held = [target if isinstance(target, Mapping) else {} for target in self.targets[1:]]
         return [place, *(sum(share * acting.get(name, 0.0) for name, share in own.items()) for own in held)]

@@ -8,6 +8,7 @@ from typing import Any
 
 from stability.checker import NAME, UNIT_TEXT
 from stability.enclosures.expression import Expression
+from stability.loops.model import CONSTANT
 
 from ..errors import InvalidInputError
 from .parameter import SOURCES, Parameter
@@ -136,12 +137,11 @@ def _check_rows(plant: Plant) -> None:
     for i, target in enumerate(plant.targets):
         if isinstance(target, Mapping):
             quotients = [f"{load}/{name}" for load in plant.disturbances for name in plant.parameters]
-            known = ("r0", "r1", "r2", *plant.disturbances, *quotients)
+            known = ("r0", "r1", "r2", CONSTANT, *plant.disturbances, *quotients)
             other = next((name for name in target if name not in known), "" if plant.controlled[i] else None)
             if other is not None:
-                rule = (
-                    f"target {i + 1} is of a row without law, and made of r0, r1, r2, disturbances: got {other!r:.40}"
-                )
+                parts = "r0, r1, r2, constant, disturbances"
+                rule = f"target {i + 1} is of a row without law, and made of {parts}: got {other!r:.40}"
                 raise _wrong(rule, "correct it")
         elif target not in ("reference", "zero") and not (
             isinstance(target, int) and 0 <= target < i and plant.controlled[target]

@@ -137,8 +137,9 @@ def check_motion(machine: Machine, references: tuple[Reference, ...]) -> None:
 
 
 def state_key(plant: Plant, state: str) -> str:
-    """The key of a state in a study: its name and its unit."""
-    return f"{state}_{_SUFFIX[plant.state_units[plant.states.index(state)]]}"
+    """The key of a state in a study: its name and its unit; the name alone of one without a usual unit."""
+    suffix = _SUFFIX.get(plant.state_units[plant.states.index(state)])
+    return state if suffix is None else f"{state}_{suffix}"
 
 
 def check_states(section: str, given: Mapping[str, float], machine: Machine) -> Iterator[InvalidInputError]:

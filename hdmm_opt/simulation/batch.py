@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stability.loops.model import CONSTANT
+
 from ..control.law import step_function
 from ..problem import GainSet, Member, Problem
 from .engine.engine import Batch
@@ -193,7 +195,9 @@ def _targets_of(law: Any) -> Any:
     start = ca.vertcat(*law.start([0.0] * len(plant.states), ca.vertsplit(gains)))
     virtual, _ = law.virtual_controls(x, r, start, gains, nominal, load)
     acting, p = ca.SX.sym("acting", plant.w.numel()), ca.SX.sym("p", plant.p.numel())
-    signals = {f"r{k}": r[k] for k in range(3)} | {name: acting[k] for k, name in enumerate(plant.disturbances)}
+    signals = {CONSTANT: ca.SX(1), **{f"r{k}": r[k] for k in range(3)}} | {
+        name: acting[k] for k, name in enumerate(plant.disturbances)
+    }
     signals |= {f"{load}/{name}": acting[k] / p[j] for k, load in enumerate(plant.disturbances)
                 for j, name in enumerate(plant.parameters)}  # fmt: skip
     goals = [

@@ -12,6 +12,8 @@ from ..enclosures.interval import Interval
 from .observer import Observer
 
 #: What rows track that follow no other row, as sums of signals.
+#: The signal of a target that is one.
+CONSTANT = "constant"
 ALONE: Mapping[str, Mapping[str, float]] = {"reference": {"r0": 1.0}, "zero": {}}
 
 
@@ -23,8 +25,8 @@ class Row:
         state: Name of its state.
         unit: Unit of its state.
         target: "reference" (r0), "zero", the index of the row whose virtual control is the target, or, where the law
-            does not act, coefficients of r0, r1, r2, "DISTURBANCE" and "DISTURBANCE/PARAMETER": their sum is the value
-            of the state in the motion that is asked for.
+            does not act, coefficients of r0, r1, r2, "constant", "DISTURBANCE" and "DISTURBANCE/PARAMETER": their sum
+            is the value of the state in the motion that is asked for.
         controlled: True where the RAC law acts in this row; False for an actuator lag.
     """
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..enclosures.form import ONE, Form, Symbols, Value, evaluate, tangent
 from ..enclosures.interval import Interval
-from .model import Bounds, Gains, LoopModel
+from .model import CONSTANT, Bounds, Gains, LoopModel
 
 Array = NDArray[np.float64]
 
@@ -187,7 +187,9 @@ class Builder:
         return found
 
     def _signal(self, name: str) -> Form:
-        """A derivative of the reference; or a disturbance, its middle where its rate has no bound."""
+        """A derivative of the reference, one; or a disturbance, its middle where its rate has no bound."""
+        if name == CONSTANT:
+            return Form(constant=ONE)
         if name in ("r0", "r1", "r2"):
             return Form.of(name)
         if name in self.rated:
