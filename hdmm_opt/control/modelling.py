@@ -1,8 +1,8 @@
 """What a law may know of its plant: modelling terms, taken from the plant itself term by term.
 
 "mechanics" (acceleration, viscous friction and nominal load, at the reference), "friction" (in addition Coulomb
-friction and the direction-dependent loss), and "resistance", "back_emf" and "decoupling" (electrical, at the measured
-state).
+friction and the direction-dependent loss), "resistance", "back_emf" and "decoupling" (electrical, at the measured
+state), and "flow" (the opening of a valve whose oil moves the actuator at the reference's speed).
 
 Where the speed of the reference changes sign, "friction" jumps with it, and the plant's own friction need not: near
 standstill a proof has to allow for both directions. Its use lowers the simulated error and raises the certified one.
@@ -19,7 +19,9 @@ ELECTRICAL = {"resistance": "resistance", "back_emf": "torque_constant", "decoup
 #: Parameters of the plant that only the term "friction" compensates.
 FRICTION = ("screw_friction", "gear_loss", "coulomb_friction")
 #: Modelling terms that a study may ask for.
-MODELLING = ("mechanics", "friction", *ELECTRICAL)
+MODELLING = ("mechanics", "friction", *ELECTRICAL, "flow")
+#: Levels at which the input meters oil.
+METERED = ("valve", "flow")
 
 
 def check_modelling(plant: Plant, modelling: tuple[str, ...]) -> None:
@@ -28,13 +30,17 @@ def check_modelling(plant: Plant, modelling: tuple[str, ...]) -> None:
     Raises:
         ValueError: such a term.
     """
-    if modelling and plant.modes:
-        raise ValueError("controller.modelling needs a plant whose states are all measured: leave it empty")
+    if set(modelling) - {"flow"} and plant.modes:
+        raise ValueError(
+            'controller.modelling needs a plant whose states are all measured: leave it empty, or "flow" alone'
+        )
     for term in modelling:
         if term not in MODELLING:
             raise ValueError(f'controller.modelling knows {", ".join(MODELLING)}: got "{term}"')
         if term == "friction" and "mechanics" not in modelling:
             raise ValueError('modelling term "friction" adds to "mechanics": put "mechanics" beside it')
+        if term == "flow" and plant.level not in METERED:
+            raise ValueError(f'modelling term "flow" needs an input that meters oil: got plant.level "{plant.level}"')
         if term in ELECTRICAL and plant.level != "voltage":
             raise ValueError(
                 f'modelling term "{term}" is electrical and needs plant.level = "voltage": '
@@ -63,10 +69,12 @@ def modelling_term(
         known = [0 if name in left_out else nominal[k] for k, name in enumerate(plant.parameters)]
         no_input = ca.SX.zeros(len(plant.inputs))
         return -plant.at(x=x, u=no_input, w=load, p=ca.vertcat(*known))[i]
+    moving = 2 if plant.first == "position" else 1
+    at_reference = ca.vertcat(*(r[k] for k in range(moving)), *[0] * (len(plant.states) - moving))
+    if i in plant.input_map and plant.level in METERED:
+        return plant.demand(i, 0, x=at_reference, w=load, p=nominal) if "flow" in modelling else ca.SX(0)
     if "mechanics" not in modelling:
         return ca.SX(0)
     left_out = () if "friction" in modelling else FRICTION
     known = [0 if name in left_out else nominal[k] for k, name in enumerate(plant.parameters)]
-    moving = 2 if plant.first == "position" else 1
-    at_reference = ca.vertcat(*(r[k] for k in range(moving)), *[0] * (len(plant.states) - moving))
     return plant.demand(i, r[moving], x=at_reference, w=load, p=ca.vertcat(*known))

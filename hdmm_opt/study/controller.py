@@ -29,7 +29,7 @@ class ControllerSection(Section):
     """
 
     law: Annotated[str, Field(pattern="^[a-z][a-z0-9_]*$", max_length=40)]
-    modelling: tuple[Literal["mechanics", "friction", "resistance", "back_emf", "decoupling"], ...] = ()
+    modelling: tuple[Literal["mechanics", "friction", "resistance", "back_emf", "decoupling", "flow"], ...] = ()
     rate_hz: Rate
     rates_hz: dict[Name, Rate] = Field(default_factory=dict)
     delay_s: NonNegative = 0.0

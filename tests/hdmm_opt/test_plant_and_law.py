@@ -174,7 +174,9 @@ def test_terms_that_do_not_fit_are_refused():
         RAC(plant=build("torque"), modelling=("back_emf",))
     with pytest.raises(ValueError, match='put "mechanics" beside it'):
         RAC(plant=build("torque"), modelling=("friction",))
-    assert set(MODELLING) == {"mechanics", "friction", "resistance", "back_emf", "decoupling"}
+    with pytest.raises(ValueError, match='needs an input that meters oil: got plant.level "torque"'):
+        RAC(plant=build("torque"), modelling=("flow",))
+    assert set(MODELLING) == {"mechanics", "friction", "resistance", "back_emf", "decoupling", "flow"}
 
 
 def test_effort_is_the_inverse_of_the_plant():
