@@ -112,8 +112,8 @@ golden: Golden vectors follow from the gains and the law, to float accuracy.
 effects: Whether a plant and a coupling feel what the study states.
 
   Two floats that differ are a witness that they do; nothing is proved of how much. Obligation: plant. Must fail: a
-  plant that multiplies its load by 0, a parameter without effect in the set and in its mirror image, a machine that is
-  the same for every payload.
+  plant that multiplies its load by 0, a parameter without effect, backlash without one in the mirror image of the set
+  too, a machine that is the same for every payload.
 
 obligations: All obligations of a member, decided.
 
@@ -186,6 +186,8 @@ VARYING = "effectiveness"
 ROUND = Fraction(1, 10**12)
 #: A place is met and a duration kept to this share of its size and a picometre or picosecond; a limit to that share.
 MET, FLOOR = Fraction(1, 10**9), Fraction(1, 10**12)
+#: The parameter that may be felt beyond the certified set alone: a contact that stays.
+IDLE = "backlash"
 #: An effect of what a study states, relative to all that moves a row, below which it counts for none.
 LEAST_EFFECT = Fraction(1, 10**9)
 #: The same of a load: relative to all that moves a row, and to the loads of a machine.
@@ -3663,11 +3665,10 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Impulse]:
     ranges |= {name: symmetric(loop.size(name, box, resting=False)) for name in claim.inputs}
     effects = effects_of(claim, ranges)
     spare = {name: v / (LEAST_LOAD if name in claim.disturbances else LEAST_EFFECT) for name, v in effects.items()}
-    unfelt = [name for name in claim.parameters if spare.get(name, 1) < 1]
-    other = effects_of(claim, mirrored(ranges)) if unfelt else {}
-    idle = [name for name in unfelt if other[name] >= LEAST_EFFECT]
-    spare = {name: share for name, share in spare.items() if name not in idle}
-    beyond = "".join(f", {name} where the certified set does not reach" for name in idle)
+    beyond = ""
+    if spare.get(IDLE, 1) < 1 and effects_of(claim, mirrored(ranges))[IDLE] >= LEAST_EFFECT:
+        del spare[IDLE]
+        beyond = f", {IDLE} where the certified set does not reach"
     weakest = min(spare, key=spare.__getitem__, default="")
     loads = "".join(
         f"{name} moves its row by {percent(effects[name], up=False)}, "

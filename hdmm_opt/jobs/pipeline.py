@@ -62,7 +62,8 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
     if problem.searched and effort.iterations:
         progress.stage(f"gains: {study.tuning.method}")
         budget = (effort.population, effort.iterations)
-        tuned = search(problem, tuned, study.tuning.method, budget, seed, options, state, progress)
+        fine = options.full and refinable(problem)
+        tuned = search(problem, tuned, study.tuning.method, budget, seed, options, state, progress, refine=fine)
         if options.full:
             progress.stage("gains: pattern search with refined proofs")
             tuned = polished(problem, tuned, options, progress)

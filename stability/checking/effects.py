@@ -1,8 +1,8 @@
 """Whether a plant and a coupling feel what the study states.
 
 Two floats that differ are a witness that they do; nothing is proved of how much. Obligation: plant. Must fail: a
-plant that multiplies its load by 0, a parameter without effect in the set and in its mirror image, a machine that is
-the same for every payload.
+plant that multiplies its load by 0, a parameter without effect, backlash without one in the mirror image of the set
+too, a machine that is the same for every payload.
 """
 
 from __future__ import annotations

@@ -29,6 +29,8 @@ VARYING = "effectiveness"
 ROUND = Fraction(1, 10**12)
 #: A place is met and a duration kept to this share of its size and a picometre or picosecond; a limit to that share.
 MET, FLOOR = Fraction(1, 10**9), Fraction(1, 10**12)
+#: The parameter that may be felt beyond the certified set alone: a contact that stays.
+IDLE = "backlash"
 #: An effect of what a study states, relative to all that moves a row, below which it counts for none.
 LEAST_EFFECT = Fraction(1, 10**9)
 #: The same of a load: relative to all that moves a row, and to the loads of a machine.

@@ -12,7 +12,7 @@ from .arithmetic import symmetric
 from .claim import Claim
 from .effects import effects_of, mirrored
 from .impulse import Impulse
-from .limits import LEAST_EFFECT, LEAST_LOAD, ROUNDING, NotProvedError
+from .limits import IDLE, LEAST_EFFECT, LEAST_LOAD, ROUNDING, NotProvedError
 from .loop import Loop
 from .obligation import Obligation, Use, below, decided, downward, milli, percent, upward
 
@@ -68,11 +68,10 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Impulse]:
     ranges |= {name: symmetric(loop.size(name, box, resting=False)) for name in claim.inputs}
     effects = effects_of(claim, ranges)
     spare = {name: v / (LEAST_LOAD if name in claim.disturbances else LEAST_EFFECT) for name, v in effects.items()}
-    unfelt = [name for name in claim.parameters if spare.get(name, 1) < 1]
-    other = effects_of(claim, mirrored(ranges)) if unfelt else {}
-    idle = [name for name in unfelt if other[name] >= LEAST_EFFECT]
-    spare = {name: share for name, share in spare.items() if name not in idle}
-    beyond = "".join(f", {name} where the certified set does not reach" for name in idle)
+    beyond = ""
+    if spare.get(IDLE, 1) < 1 and effects_of(claim, mirrored(ranges))[IDLE] >= LEAST_EFFECT:
+        del spare[IDLE]
+        beyond = f", {IDLE} where the certified set does not reach"
     weakest = min(spare, key=spare.__getitem__, default="")
     loads = "".join(
         f"{name} moves its row by {percent(effects[name], up=False)}, "

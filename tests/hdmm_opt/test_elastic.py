@@ -21,7 +21,7 @@ from hdmm_opt.plants.pmsm_emla import lead_angle_tangent, pmsm_emla, transmissio
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop, Run, Scenario
 from hdmm_opt.study.read import bundled_text
-from stability import Failure, Interval
+from stability import Failure, Interval, checker
 from stability.checking.limits import NotProvedError
 from stability.checking.loop import Loop as CheckedLoop
 
@@ -254,6 +254,11 @@ def test_a_load_that_keeps_the_contact_is_proved_through_backlash():
     assert not isinstance(found, Failure), found.reason
     claim = claim_of(member.model, member.bounds, member.gains(values), found, limit=1e30, accuracy=1e30)
     assert verdict(claim)
+    told = next(o for o in checker.obligations(claim)[0] if o.name == "plant").statement
+    assert told.endswith("backlash where the certified set does not reach")
+    renamed = json.loads(json.dumps(claim.plant).replace('"backlash"', '"play"'))
+    hidden = {{"backlash": "play"}.get(name, name): ends for name, ends in claim.parameters.items()}
+    assert not verdict(replace(claim, plant=renamed, parameters=hidden))
     lighter = {
         **claim.feedforward,
         "load_force": ((Fraction(5000), Fraction(76000)), claim.feedforward["load_force"][1]),

@@ -174,7 +174,7 @@ def test_terms_that_do_not_fit_are_refused():
         RAC(plant=build("torque"), modelling=("back_emf",))
     with pytest.raises(ValueError, match='put "mechanics" beside it'):
         RAC(plant=build("torque"), modelling=("friction",))
-    with pytest.raises(ValueError, match='needs an input that meters oil: got plant.level "torque"'):
+    with pytest.raises(ValueError, match="needs an input that meters oil"):
         RAC(plant=build("torque"), modelling=("flow",))
     assert set(MODELLING) == {"mechanics", "friction", "resistance", "back_emf", "decoupling", "flow"}
 
