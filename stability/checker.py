@@ -408,12 +408,13 @@ class Node:
 
 @dataclass
 class Table:
-    """Ranges of all symbols, and definitions of the derived ones, oldest first."""
+    """Ranges of all symbols, definitions of the derived ones, oldest first, and how many maxima no range decides."""
 
     ranges: dict[str, Interval] = field(default_factory=lambda: {"": ONE})
     definitions: dict[str, Form] = field(default_factory=dict)
     names: dict[int, str] = field(default_factory=dict)
     keys: dict[tuple[Any, ...], int] = field(default_factory=dict)
+    undecided: int = 0
 
     def key(self, *operation: Any) -> int:
         """A number for an operation; the same for the same operator on the same arguments."""
@@ -485,6 +486,7 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
         if operator == "max":
             if apart(a.range, b.range):
                 return a if a.range[0] >= b.range[1] else b
+            table.undecided += 1
             return table.fresh(key, between(a.form, b.form), greater(a.range, b.range))
         if operator == "div":
             form, natural = times(a.form, inverse(b.range)), mul(a.range, inverse(b.range))
@@ -1045,7 +1047,7 @@ def plain_text(value: Any) -> None:
 
 # --- grammar ---
 
-MODELLING = ("mechanics", "friction", "resistance", "back_emf", "decoupling")
+MODELLING = ("mechanics", "friction", "resistance", "back_emf", "decoupling", "flow")
 RANGE = entry_of({}, dict.fromkeys(("value", "min", "max"), plain_number))
 SOURCE = some("table", "derived", "public", "assumed")
 HASH = text
@@ -1938,11 +1940,15 @@ def check_names(
     parameters = assumed["parameter"]
     inertias = reads(plant, plant["outputs"][: len(states)])
     need(inertias <= set(parameters) - {"effectiveness"}, "an inertia depends on more than constant parameters")
-    listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], "r0", "r1", "r2", "r3"]
+    signals = ["r0", "r1", "r2", "r3", "constant"]
+    listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], *signals]
     for name in (*listed, *nominal, *(str(limit["name"]) for limit in limits)):
         need(isinstance(name, str) and NAME.fullmatch(name) is not None, "a name must be a plain identifier")
     need(len(set(listed)) == len(listed), "a name stands for two different signals")
-    need(reads(plant) <= set(listed) - {"r0", "r1", "r2", "r3"}, "the plant reads a name without an assumption")
+    need(
+        reads(plant) <= set(listed) - set(signals),
+        "the plant reads a name without an assumption",
+    )
     unread = {*parameters, *assumed["disturbance"]} - reads(plant)
     need(not unread, f"the plant does not use {', '.join(sorted(unread))}, which the study states")
     foreseen = {*nominal, *assumed["feedforward"]}
@@ -2068,6 +2074,10 @@ def printable(unit: Any) -> bool:
 
 # --- loop ---
 
+#: Derivatives of the reference that have a bounded rate.
+SIGNALS = ("r0", "r1", "r2")
+
+
 def placed(target: Any) -> dict[str, Fraction]:
     """Coefficients of the signals whose sum is the target of a row that follows no other."""
     if isinstance(target, dict):
@@ -2179,11 +2189,11 @@ class Loop:
         """A derivative of the reference, one; or a disturbance, its middle where its rate has no bound."""
         if name == "constant":
             return {"": ONE}
-        if name in ("r0", "r1", "r2"):
+        if name in SIGNALS:
             return {name: ONE}
         if name in self.rated:
             return {f"w:{name}": ONE}
-        need(name in self.nodes and name != "r3", "what a row tracks is made of r0, r1, r2 and disturbances")
+        need(name in self.claim.disturbances, "what a row tracks is made of r0, r1, r2, constant and disturbances")
         low, high = self.nodes[name].range
         middle = down((low + high) / 2)
         return {"": (middle, middle)}
@@ -2263,10 +2273,8 @@ class Loop:
         for i, row in enumerate(claim.rows):
             target = row["target"]
             own = {} if isinstance(target, int) else placed(target)
-            parts = [
-                times(moving[k] if k in moving else {"": self.rated.get(k, (ZERO, ZERO))[1]}, (v, v))
-                for k, v in own.items()
-            ]
+            known = {k: moving[k] if k in SIGNALS else {"": self.rated.get(k, (ZERO, ZERO))[1]} for k in own}
+            parts = [times(known[k], (share, share)) for k, share in own.items()]
             rates.append(self.virtual[target] if isinstance(target, int) else plus({}, *parts))
             self.closed.append(plus(forces[i], times(rates[i], neg(self.mass[i]))))
             if i in self.gain:
@@ -3666,7 +3674,8 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Impulse]:
     effects = effects_of(claim, ranges)
     spare = {name: v / (LEAST_LOAD if name in claim.disturbances else LEAST_EFFECT) for name, v in effects.items()}
     beyond = ""
-    if spare.get(IDLE, 1) < 1 and effects_of(claim, mirrored(ranges))[IDLE] >= LEAST_EFFECT:
+    idle = spare.get(IDLE, 1) < 1 and not loop.table.undecided
+    if idle and effects_of(claim, mirrored(ranges))[IDLE] >= LEAST_EFFECT:
         del spare[IDLE]
         beyond = f", {IDLE} where the certified set does not reach"
     weakest = min(spare, key=spare.__getitem__, default="")

@@ -2,7 +2,7 @@
 
 "mechanics" (acceleration, viscous friction and nominal load, at the reference), "friction" (in addition Coulomb
 friction and the direction-dependent loss), "resistance", "back_emf" and "decoupling" (electrical, at the measured
-state), and "flow" (the opening of a valve whose oil moves the actuator at the reference's speed).
+state), and "flow" (the opening of a valve whose oil moves the actuator at the reference's speed, without a load).
 
 Where the speed of the reference changes sign, "friction" jumps with it, and the plant's own friction need not: near
 standstill a proof has to allow for both directions. Its use lowers the simulated error and raises the certified one.
@@ -17,7 +17,7 @@ from ..plants import Plant
 #: Electrical modelling terms, and the parameter that carries each.
 ELECTRICAL = {"resistance": "resistance", "back_emf": "torque_constant", "decoupling": "inductance"}
 #: Parameters of the plant that only the term "friction" compensates.
-FRICTION = ("screw_friction", "gear_loss", "coulomb_friction")
+FRICTION = ("screw_friction", "gear_loss", "coulomb_friction", "stribeck_friction")
 #: Modelling terms that a study may ask for.
 MODELLING = ("mechanics", "friction", *ELECTRICAL, "flow")
 #: Levels at which the input meters oil.
@@ -56,7 +56,7 @@ def modelling_term(
     Args:
         plant: The plant.
         modelling: The terms that the law holds.
-        i: The row; not one that tracks the reference.
+        i: The row; not the first one of a plant whose first state is a position.
         x: Measured states. Shape (n,).
         r: Reference and its first three derivatives. Shape (4,).
         nominal: Nominal parameters. Shape of plant.p.

@@ -22,6 +22,10 @@ RIGID, ELASTIC = ("pmsm_emla", "torque"), "elastic_emla"
 FAR = 10.0
 
 
+#: A problem and what is run in it.
+Ground = tuple[Problem, list[Scenario]]
+
+
 def challenges(problem: Problem, seed: int) -> list[Scenario]:
     """The study's scenarios, then a constant load, a far start, half and twice the gain, and a slow drive, all noisy.
 
@@ -34,7 +38,7 @@ def challenges(problem: Problem, seed: int) -> list[Scenario]:
     return [*scenarios(problem), *_more(problem, seed)]
 
 
-def grounds(problem: Problem, seed: int) -> list[tuple[Problem, list[Scenario]]]:
+def grounds(problem: Problem, seed: int) -> list[Ground]:
     """What tuned controllers are scored on, each with the problem in which it runs.
 
     Args:
@@ -63,9 +67,10 @@ def grounds(problem: Problem, seed: int) -> list[tuple[Problem, list[Scenario]]]
 
 def assumed_of(problem: Problem) -> str:
     """What of a comparison has no public source, in one line: of the machine, and of the springs it is tried on."""
-    text, spring = assumed_text(problem), "stiffness"
+    text = assumed_text(problem)
     if _rigid(problem):
-        text += f", {spring} of the screw where it is a spring ({SPRING[spring].value:g} {SPRING[spring].unit})"
+        spring = ", ".join(f"{name} {p.value:g} {p.unit}" for name, p in SPRING.items())
+        text += f", the screw where it is a spring ({spring})"
     return text
 
 

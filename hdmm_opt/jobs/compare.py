@@ -14,7 +14,7 @@ from stability import Failure
 from tuning import Budget, Outcome
 from tuning import search as run_search
 
-from ..control import GainSpec
+from ..control import GainSpec, Law
 from ..control.fitted import fitted
 from ..control.rivals.cascade import Cascade
 from ..control.rivals.registry import rivals
@@ -27,7 +27,7 @@ from ..problem import GainSet, Problem
 from ..problem.margins import certified_error, violation
 from ..simulation import Figures, Loop, Run
 from .certify import refinable, strongest
-from .challenges import grounds
+from .challenges import Ground, grounds
 from .evaluation import cost_scenarios, simulated_cost
 from .options import Options, Progress
 from .search import search
@@ -116,14 +116,15 @@ def compare(
     """
     if not problem.searched:
         raise InvalidInputError("a comparison needs gains to search: all are fixed; give one min and max")
+    against = {name: _laws(problem, kind) for name, kind in rivals().items()}
     progress.stage("proof of a start")
-    first = starting_point(problem, progress)
+    first, fine = starting_point(problem, progress), refinable(problem)
     law, numbers, trials = problem.study.controller.law, range(seed, seed + seeds), []
-    loop, score = Loop(problem), _Score(problem, None, seed)
+    own, ways = [member.law for member in problem.members], grounds(problem, seed)
+    loop, score = Loop(problem), _Score(ways, own)
     for number in numbers:
         progress.stage(f"{law}, seed {number}")
         state = State(None, {}, resume=False)
-        fine = refinable(problem)
         tuned = search(problem, first, METHOD, budget, number, options, state, progress, refine=fine)
         trials.append(_law(loop, tuned, score))
     found = [Contender(name=law, trials=tuple(trials))]
@@ -135,24 +136,27 @@ def compare(
             made.append(simulated.tuned(budget, number, options.jobs, progress))
         found.append(Contender(name=name, trials=tuple(made)))
 
-    contend(f"{law}{UNPROVED}", _Simulated(problem, None, seed))
-    for name, kind in rivals().items():
-        try:
-            laws = [kind(plant=m.plant, modelling=problem.study.controller.modelling) for m in problem.members]
-        except ValueError as error:
-            raise InvalidInputError(f"{error}; compare another machine") from None
-        contend(name, _Rival(problem, name, laws, seed))
+    contend(f"{law}{UNPROVED}", _Simulated(problem, ways, own))
+    for name, laws in against.items():
+        contend(name, _Rival(problem, ways, name, laws))
     return found
+
+
+def _laws(problem: Problem, kind: type[Cascade]) -> list[Cascade]:
+    """A rival for each member."""
+    try:
+        return [kind(plant=m.plant, modelling=problem.study.controller.modelling) for m in problem.members]
+    except ValueError as error:
+        raise InvalidInputError(f"{error}; compare another machine") from None
 
 
 class _Score:
     """Runs of one kind of controller on all that tuned ones are scored on."""
 
-    def __init__(self, problem: Problem, laws: Sequence[Cascade] | None, seed: int) -> None:
-        base = laws or [member.law for member in problem.members]
+    def __init__(self, ways: Sequence[Ground], laws: Sequence[Law]) -> None:
         self.loops = [
-            (Loop(ground, laws=[fitted(law, m.plant) for law, m in zip(base, ground.members, strict=True)]), chosen)
-            for ground, chosen in grounds(problem, seed)
+            (Loop(ground, laws=[fitted(law, m.plant) for law, m in zip(laws, ground.members, strict=True)]), chosen)
+            for ground, chosen in ways
         ]
 
     def of(self, gains: GainSet) -> dict[str, Figures]:
@@ -184,9 +188,9 @@ def _bound(problem: Problem, gains: GainSet) -> float | None:
 class _Simulated:
     """A controller that is tuned in simulation alone: the law itself, with gains that need no proof."""
 
-    def __init__(self, problem: Problem, laws: Sequence[Cascade] | None, seed: int) -> None:
+    def __init__(self, problem: Problem, ways: Sequence[Ground], laws: Sequence[Law]) -> None:
         self.problem, self.size = problem, problem.searched
-        self.loop, self.score = Loop(problem, laws=laws), _Score(problem, laws, seed)
+        self.loop, self.score = Loop(problem, laws=laws), _Score(ways, laws)
 
     def gains(self, point: Array) -> GainSet:
         """Gains of all members at a point of the unit cube."""
@@ -229,8 +233,8 @@ class _Simulated:
 class _Rival(_Simulated):
     """A rival on a problem, with gains that all members share."""
 
-    def __init__(self, problem: Problem, name: str, laws: Sequence[Cascade], seed: int) -> None:
-        super().__init__(problem, laws, seed)
+    def __init__(self, problem: Problem, ways: Sequence[Ground], name: str, laws: Sequence[Cascade]) -> None:
+        super().__init__(problem, ways, laws)
         self.schema: tuple[GainSpec, ...] = laws[0].schema
         self.size = len(self.schema)
         if any([spec.name for spec in law.schema] != [spec.name for spec in self.schema] for law in laws):

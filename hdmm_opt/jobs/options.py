@@ -64,8 +64,10 @@ class Effort:
     falsify: int
 
 
-#: `--budget full`: few candidates, each judged by refined proofs where there are any.
-FULL = Effort(population=20, iterations=30, monte_carlo=1000, falsify=10_000)
+#: `--budget full`.
+FULL = Effort(population=50, iterations=100, monte_carlo=1000, falsify=10_000)
+#: Population and iterations of the same where each candidate is judged by refined proofs.
+FINE = (20, 30)
 
 
 def effort_of(study: Study, options: Options) -> Effort:

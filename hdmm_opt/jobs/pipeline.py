@@ -27,7 +27,7 @@ from .certify import longest_period, refinable, strongest
 from .condition import condition_lines
 from .contributions import budget_lines, contribution_lines, contributions
 from .falsification import falsify
-from .options import Effort, Options, Progress, effort_of
+from .options import FINE, Effort, Options, Progress, effort_of
 from .polish import polished
 from .refusal import refused
 from .reserve import reserve_lines
@@ -61,8 +61,8 @@ def design(study: Study, options: Options, progress: Progress) -> Design:
     tuned = starting_point(problem, progress)
     if problem.searched and effort.iterations:
         progress.stage(f"gains: {study.tuning.method}")
-        budget = (effort.population, effort.iterations)
-        fine = options.full and refinable(problem)
+        fine = options.full and refinable(problem) and study.tuning.method != "gradient"
+        budget = FINE if fine else (effort.population, effort.iterations)
         tuned = search(problem, tuned, study.tuning.method, budget, seed, options, state, progress, refine=fine)
         if options.full:
             progress.stage("gains: pattern search with refined proofs")

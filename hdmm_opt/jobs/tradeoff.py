@@ -15,7 +15,7 @@ from ..problem import GainSet, Problem, assemble
 from ..study import Study
 from .checkpoint import kept_population, to_data
 from .evaluation import OBJECTIVES, make_evaluator
-from .options import Options, Progress
+from .options import FULL, Options, Progress
 from .space import Window
 from .start import starting_point
 from .workers import workers
@@ -42,8 +42,6 @@ class Tradeoff:
 
 #: Population and iterations of a quick trade-off of one member; those of the study where members are linked.
 QUICK = (32, 25)
-#: The same with the large budget.
-WHOLE = (50, 100)
 
 
 def tradeoff(
@@ -69,7 +67,7 @@ def tradeoff(
         raise InvalidInputError("a trade-off needs gains to search: all are fixed; give one min and max")
     seed = options.seed_of(study)
     own = (study.tuning.population, study.tuning.iterations) if problem.linked else QUICK
-    size = size or (WHOLE if options.full else own)
+    size = size or ((FULL.population, FULL.iterations) if options.full else own)
     population, iterations = size
     job = {"tradeoff": study.model_dump(mode="json"), "seed": seed, "size": list(size)}
     state = State(options.state, job, resume=options.resume)

@@ -38,7 +38,7 @@ LINE = {
         loss=True,
         value=4.1e-12,
         unit="m^4 s/kg",
-        tolerance=0.6,
+        tolerance=0.61,
         meaning="leakage across the motor: 3.3e-12, twice or half",
     ),
 }

@@ -175,7 +175,7 @@ class Plant:
         return i if i in reading or len(reading) != 1 else reading[0]
 
     def standing(self, loads: Sequence[float]) -> list[float]:
-        """The state that rests in the middle of the stroke under some disturbances, at nominal parameters."""
+        """The state in the middle of the stroke that is asked for at standstill, at nominal parameters."""
         values = self.values()
         acting = {CONSTANT: 1.0, **dict(zip(self.disturbances, loads, strict=True))}
         acting |= {f"{load}/{name}": acting[load] / v for load in self.disturbances for name, v in values.items() if v}

@@ -89,7 +89,7 @@ def pmsm_emla(
     References:
         Heydari Shahna (2025), publications P-1, P-2 and P-4; Krause et al. (2013), ch. 4, for the dq equations.
 
-    Not guaranteed: cogging, saturation and thermal effects are not modelled; screw and gear are rigid, see
+    Not guaranteed: backlash, cogging, saturation and thermal effects are not modelled; screw and gear are rigid, see
     `elastic_emla`.
     """
     known, motor = completed(defaults(level), parameters), {**ratings(level), **(rated or {})}

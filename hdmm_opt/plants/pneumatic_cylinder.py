@@ -1,9 +1,10 @@
 """A pneumatic cylinder behind a fast valve whose flow is choked, with equal areas on both sides.
 
-    x' = v,    m v' = A p - friction(v) - F,    (V / n p_0) p' = q u - A v - c p
+    x' = v,    m v' = A p - friction(v) - F,    (V / 2 n p_0) p' = q u - A v - c p
 
 p is the difference of the pressures of both chambers around their mean p_0, V the air of one chamber, n the polytropic
-exponent; a choked edge lets so much air through as its opening says, whatever is behind it (ISO 6358).
+exponent: what goes into one chamber leaves the other, so that their difference changes twice. A choked edge lets so
+much air through as its opening says, whatever is behind it (ISO 6358).
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ def pneumatic_cylinder(
         state_units=("m", "m/s", "Pa"), inputs=("opening",), input_unit="1", disturbances=("load_force",),
         parameters=known, targets=("reference", 0, 1), controlled=(True, True, True), input_map=(2,),
         x=x, u=u, w=w, p=p,
-        mass=ca.vertcat(1, q["load_mass"], q["chamber"] / (q["exponent"] * q["mean_pressure"])),
+        mass=ca.vertcat(1, q["load_mass"], q["chamber"] / (2 * q["exponent"] * q["mean_pressure"])),
         force=ca.vertcat(
             x[1], pushed - friction(x[1], q) - w[0],
             q["flow_gain"] * u[0] - q["area"] * x[1] - q["leakage"] * x[2],

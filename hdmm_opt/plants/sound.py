@@ -8,7 +8,7 @@ from typing import Any
 
 from stability.checker import NAME, UNIT_TEXT
 from stability.enclosures.expression import Expression
-from stability.loops.model import CONSTANT
+from stability.loops.model import CONSTANT, SIGNALS
 
 from ..errors import InvalidInputError
 from .parameter import SOURCES, Parameter
@@ -42,6 +42,8 @@ def check_plant(plant: Any) -> Plant:
     for name in names:
         if NAME.fullmatch(name) is None or names.count(name) > 1:
             raise _wrong(f"names must be different plain identifiers: got {name!r:.40}", "rename it")
+        if name in (*SIGNALS, "r3", CONSTANT):
+            raise _wrong(f"{', '.join(SIGNALS)}, r3 and {CONSTANT} are signals of a target: got {name!r}", "rename it")
     if plant.state_units[0] not in FIRST[plant.first]:
         wanted = " or ".join(FIRST[plant.first])
         raise _wrong(f"a first {plant.first} must be in {wanted}: got {plant.state_units[0]!r:.20}", "convert it")
@@ -137,7 +139,7 @@ def _check_rows(plant: Plant) -> None:
     for i, target in enumerate(plant.targets):
         if isinstance(target, Mapping):
             quotients = [f"{load}/{name}" for load in plant.disturbances for name in plant.parameters]
-            known = ("r0", "r1", "r2", CONSTANT, *plant.disturbances, *quotients)
+            known = (*SIGNALS, CONSTANT, *plant.disturbances, *quotients)
             other = next((name for name in target if name not in known), "" if plant.controlled[i] else None)
             if other is not None:
                 parts = "r0, r1, r2, constant, disturbances"

@@ -50,12 +50,13 @@ class Node:
 
 @dataclass
 class Table:
-    """Ranges of all symbols, and definitions of the derived ones, oldest first."""
+    """Ranges of all symbols, definitions of the derived ones, oldest first, and how many maxima no range decides."""
 
     ranges: dict[str, Interval] = field(default_factory=lambda: {"": ONE})
     definitions: dict[str, Form] = field(default_factory=dict)
     names: dict[int, str] = field(default_factory=dict)
     keys: dict[tuple[Any, ...], int] = field(default_factory=dict)
+    undecided: int = 0
 
     def key(self, *operation: Any) -> int:
         """A number for an operation; the same for the same operator on the same arguments."""
@@ -127,6 +128,7 @@ def linear(program: dict[str, Any], inputs: dict[str, Node], table: Table) -> li
         if operator == "max":
             if apart(a.range, b.range):
                 return a if a.range[0] >= b.range[1] else b
+            table.undecided += 1
             return table.fresh(key, between(a.form, b.form), greater(a.range, b.range))
         if operator == "div":
             form, natural = times(a.form, inverse(b.range)), mul(a.range, inverse(b.range))

@@ -29,7 +29,7 @@ from .shape import (
     whole,
 )  # fmt: skip
 
-MODELLING = ("mechanics", "friction", "resistance", "back_emf", "decoupling")
+MODELLING = ("mechanics", "friction", "resistance", "back_emf", "decoupling", "flow")
 RANGE = entry_of({}, dict.fromkeys(("value", "min", "max"), plain_number))
 SOURCE = some("table", "derived", "public", "assumed")
 HASH = text

@@ -15,6 +15,9 @@ from .forms import Form, Node, Table, derivative, linear, over, plus, times
 from .limits import VARYING, NotProvedError, need
 from .parsing import reads
 
+#: Derivatives of the reference that have a bounded rate.
+SIGNALS = ("r0", "r1", "r2")
+
 
 def placed(target: Any) -> dict[str, Fraction]:
     """Coefficients of the signals whose sum is the target of a row that follows no other."""
@@ -127,11 +130,11 @@ class Loop:
         """A derivative of the reference, one; or a disturbance, its middle where its rate has no bound."""
         if name == "constant":
             return {"": ONE}
-        if name in ("r0", "r1", "r2"):
+        if name in SIGNALS:
             return {name: ONE}
         if name in self.rated:
             return {f"w:{name}": ONE}
-        need(name in self.nodes and name != "r3", "what a row tracks is made of r0, r1, r2 and disturbances")
+        need(name in self.claim.disturbances, "what a row tracks is made of r0, r1, r2, constant and disturbances")
         low, high = self.nodes[name].range
         middle = down((low + high) / 2)
         return {"": (middle, middle)}
@@ -211,10 +214,8 @@ class Loop:
         for i, row in enumerate(claim.rows):
             target = row["target"]
             own = {} if isinstance(target, int) else placed(target)
-            parts = [
-                times(moving[k] if k in moving else {"": self.rated.get(k, (ZERO, ZERO))[1]}, (v, v))
-                for k, v in own.items()
-            ]
+            known = {k: moving[k] if k in SIGNALS else {"": self.rated.get(k, (ZERO, ZERO))[1]} for k in own}
+            parts = [times(known[k], (share, share)) for k, share in own.items()]
             rates.append(self.virtual[target] if isinstance(target, int) else plus({}, *parts))
             self.closed.append(plus(forces[i], times(rates[i], neg(self.mass[i]))))
             if i in self.gain:

@@ -69,7 +69,8 @@ def obligations(claim: Claim) -> tuple[list[Obligation], Loop, Impulse]:
     effects = effects_of(claim, ranges)
     spare = {name: v / (LEAST_LOAD if name in claim.disturbances else LEAST_EFFECT) for name, v in effects.items()}
     beyond = ""
-    if spare.get(IDLE, 1) < 1 and effects_of(claim, mirrored(ranges))[IDLE] >= LEAST_EFFECT:
+    idle = spare.get(IDLE, 1) < 1 and not loop.table.undecided
+    if idle and effects_of(claim, mirrored(ranges))[IDLE] >= LEAST_EFFECT:
         del spare[IDLE]
         beyond = f", {IDLE} where the certified set does not reach"
     weakest = min(spare, key=spare.__getitem__, default="")

@@ -172,11 +172,15 @@ def check_names(
     parameters = assumed["parameter"]
     inertias = reads(plant, plant["outputs"][: len(states)])
     need(inertias <= set(parameters) - {"effectiveness"}, "an inertia depends on more than constant parameters")
-    listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], "r0", "r1", "r2", "r3"]
+    signals = ["r0", "r1", "r2", "r3", "constant"]
+    listed = [*states, *model["inputs"], *parameters, *assumed["disturbance"], *signals]
     for name in (*listed, *nominal, *(str(limit["name"]) for limit in limits)):
         need(isinstance(name, str) and NAME.fullmatch(name) is not None, "a name must be a plain identifier")
     need(len(set(listed)) == len(listed), "a name stands for two different signals")
-    need(reads(plant) <= set(listed) - {"r0", "r1", "r2", "r3"}, "the plant reads a name without an assumption")
+    need(
+        reads(plant) <= set(listed) - set(signals),
+        "the plant reads a name without an assumption",
+    )
     unread = {*parameters, *assumed["disturbance"]} - reads(plant)
     need(not unread, f"the plant does not use {', '.join(sorted(unread))}, which the study states")
     foreseen = {*nominal, *assumed["feedforward"]}

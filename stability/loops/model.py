@@ -11,9 +11,9 @@ from ..enclosures.expression import Expression
 from ..enclosures.interval import Interval
 from .observer import Observer
 
+#: The signal of a target that is one, and the derivatives of the reference that have a bounded rate.
+CONSTANT, SIGNALS = "constant", ("r0", "r1", "r2")
 #: What rows track that follow no other row, as sums of signals.
-#: The signal of a target that is one.
-CONSTANT = "constant"
 ALONE: Mapping[str, Mapping[str, float]] = {"reference": {"r0": 1.0}, "zero": {}}
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..enclosures.form import ONE, Form, Symbols, Value, evaluate, tangent
 from ..enclosures.interval import Interval
-from .model import CONSTANT, Bounds, Gains, LoopModel
+from .model import CONSTANT, SIGNALS, Bounds, Gains, LoopModel
 
 Array = NDArray[np.float64]
 
@@ -113,7 +113,7 @@ class Builder:
             self.inputs[name] = self.symbols.value(name, beside)
         self.rated = {**bounds.feedforward}
         for name in model.quotients:
-            self._quotient(name, *name.split("/"))
+            self._quotient(name, *name.split("/", 1))
         for k in range(4):
             self.inputs[f"r{k}"] = self.symbols.value(f"r{k}", Form.of(f"r{k}"))
         self.noise: dict[int, float] = {}
@@ -190,12 +190,12 @@ class Builder:
         """A derivative of the reference, one; or a disturbance, its middle where its rate has no bound."""
         if name == CONSTANT:
             return Form(constant=ONE)
-        if name in ("r0", "r1", "r2"):
+        if name in SIGNALS:
             return Form.of(name)
         if name in self.rated:
             return Form.of(f"w:{name}")
-        if name not in self.inputs or name == "r3":
-            raise ValueError(f"a target is made of r0, r1, r2 and disturbances: got {name}")
+        if name not in self.bounds.disturbances:
+            raise ValueError(f"a target is made of r0, r1, r2, constant and disturbances: got {name}")
         span = self.inputs[name].range
         return Form(constant=Interval((span.low + span.high) / 2))
 
@@ -267,7 +267,7 @@ class Builder:
         for i, row in enumerate(self.model.rows):
             target_rate = virtual[row.target] if isinstance(row.target, int) else Form()
             for name, share in row.place.items():
-                rate = tangents[name] if name in tangents else Form(constant=self.rated.get(name, STILL)[1])
+                rate = tangents[name] if name in SIGNALS else Form(constant=self.rated.get(name, STILL)[1])
                 target_rate = target_rate + rate.scaled(Interval(share))
             self.target_rate.append(target_rate)
             rows.append(forces[i] - target_rate.scaled(masses[i]))

@@ -21,9 +21,11 @@ from hdmm_opt.plants.pmsm_emla import lead_angle_tangent, pmsm_emla, transmissio
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop, Run, Scenario
 from hdmm_opt.study.read import bundled_text
-from stability import Failure, Interval, checker
-from stability.checking.limits import NotProvedError
+from stability import Failure, Interval, checker, first_box
+from stability.checking.arithmetic import WORK
+from stability.checking.limits import NotProvedError, UnreadableError
 from stability.checking.loop import Loop as CheckedLoop
+from stability.loops.box import UnboundedError
 
 #: β_1, β_2, γ_2 of a loop that is proved at the motor, and of one at the load.
 MOTOR, LOAD = (40.0, 12000.0, 2e5), (20.0, 6000.0, 5e4)
@@ -206,16 +208,28 @@ def test_the_checker_decides_a_loop_over_a_spring(proved):
 
 
 @pytest.mark.parametrize(
-    "target", [{"load_force/drive_lag/2": 1}, {"r3": 1}, {"load_force/effectiveness": 1}, {"speed": 1}]
-)
-def test_the_checker_refuses_what_a_state_cannot_follow(proved, target):
+    ("target", "words"),
+    [({"load_force/drive_lag/2": 1}, "divides a disturbance"), ({"load_force/effectiveness": 1}, "divides a disturbance"),
+     *[({name: 1}, "made of r0, r1, r2, constant and disturbances")
+       for name in ("r3", "position", "speed", "torque", "stretch", "drive_lag", "torque_command")]],
+)  # fmt: skip
+def test_the_checker_refuses_what_a_state_cannot_follow(proved, target, words):
+    """Of a state the middle would be taken for its value, and its own rate for the rate of that."""
     problem, values, found = proved
     (member,) = problem.members
     claim = claim_of(member.model, member.bounds, member.gains(values), found, limit=1e30, accuracy=1e30)
+    WORK.begin(10**6)
+    CheckedLoop(claim, Fraction(0))
     rows = [dict(row) for row in claim.rows]
     rows[3]["target"] = {name: Fraction(share) for name, share in target.items()}
-    with pytest.raises((NotProvedError, ValueError)):
+    with pytest.raises((NotProvedError, UnreadableError), match=words):
         CheckedLoop(replace(claim, rows=rows), Fraction(0))
+    model = replace(member.model, rows=tuple(
+        replace(row, target={name: float(v) for name, v in target.items()}) if k == 3 else row
+        for k, row in enumerate(member.model.rows)
+    ))  # fmt: skip
+    with pytest.raises((UnboundedError, KeyError, ValueError)):
+        first_box(model, member.bounds, member.gains(values), found.half_widths)
 
 
 def test_runs_stay_inside_what_is_proved(proved):

@@ -11,14 +11,20 @@ from known_answers import claim_of, verdict
 from machines import study_from
 from scipy.integrate import solve_ivp
 
+from hdmm_opt.control.rivals.registry import rivals
+from hdmm_opt.errors import InvalidInputError
+from hdmm_opt.files.seal import to_text
 from hdmm_opt.jobs.certify import certificate
+from hdmm_opt.jobs.compare import compare
+from hdmm_opt.jobs.options import Options, Progress
+from hdmm_opt.jobs.pipeline import design
 from hdmm_opt.plants.hydraulic_wheel import area, defaults, drive_force, hydraulic_wheel
 from hdmm_opt.plants.hydraulics import compliance, friction, valve_flow
 from hdmm_opt.plants.registry import plant_model
 from hdmm_opt.plants.sound import check_plant
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop, Run, Scenario
-from stability import Failure
+from stability import Failure, checker
 
 GRAVITY, MACHINE = 9.81, 6650.0
 
@@ -98,7 +104,7 @@ def by_hand(name, x, u, w, q):
 
     if name == "pneumatic_cylinder":
         _, v, p = x
-        stiff = q["exponent"] * q["mean_pressure"] / q["chamber"]
+        stiff = 2 * q["exponent"] * q["mean_pressure"] / q["chamber"]
         return [v, (q["area"] * p - rubbing(v) - w[0]) / q["load_mass"],
                 stiff * (q["flow_gain"] * u - q["area"] * v - q["leakage"] * p)]  # fmt: skip
     stiff = 4 * q["bulk_modulus"] / q["line_volume"]
@@ -229,3 +235,39 @@ def test_a_wheel_without_a_sensor_of_pressure_is_proved_where_little_is_uncertai
             parameters={"bulk_modulus": share})) for share in (-1.0, 1.0)]  # fmt: skip
     for figures in Loop(problem).figures(runs):
         assert 0.002 < figures.maximum_error_m <= found.ultimate[0]
+
+
+def test_a_wheel_goes_through_a_file():
+    """Fixed gains through the whole pipeline, decided by the checker from the text."""
+    exact = {
+        n: {"value": p.value, "unit": p.unit, "tolerance": 0.0} for n, p in defaults("flow").items() if p.tolerance
+    }
+    data = wheel(**exact)
+    fixed = {"beta_1": 0.02, "gamma_1": 10.0, "phi_1": 1.0}
+    data["controller"]["gains"] = {name: {"value": value} for name, value in fixed.items()}
+    result = design(study_from(data), Options(), Progress())
+    assert result.document is not None, result.verdicts
+    told = checker.check_text(to_text(result.document))
+    assert told.status == 0 and "mm/s" in told.message
+
+
+def test_the_air_of_two_chambers_is_a_spring():
+    """Both chambers balanced by hand, p_i V_i^n constant: the force that a small travel makes."""
+    plant = plant_model("pneumatic_cylinder").build("valve", {}, {})
+    q = plant.values() | {"leakage": 0.0}
+    travel = 1e-6
+    pressures = [q["mean_pressure"] * (q["chamber"] / (q["chamber"] + sign * q["area"] * travel)) ** q["exponent"]
+                 for sign in (1, -1)]  # fmt: skip
+    stiffness = -(pressures[0] - pressures[1]) / travel
+    rate = ca.Function("rate", [plant.x, plant.u, plant.w, plant.p], [plant.rate])
+    made = np.array(rate([0.2, 0.1, 0.0], 0, 0, list(q.values()))).ravel()
+    assert -made[2] / 0.1 == pytest.approx(stiffness, rel=1e-6)
+
+
+def test_rivals_of_force_are_not_made_for_a_valve():
+    with pytest.raises(InvalidInputError, match="first state is a position; compare another machine"):
+        compare(assemble(study_from(wheel())), (3, 0), 1, Options(), Progress(), seeds=1)
+    for model in ("hydraulic_cylinder", "pneumatic_cylinder"):
+        for kind in rivals().values():
+            with pytest.raises(ValueError, match="it needs another input than a valve"):
+                kind(plant=plant_model(model).build("valve", {}, {}))

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 from ...plants import Plant
 from ..law import GainSpec, limited
-from ..modelling import check_modelling, modelling_term
+from ..modelling import METERED, check_modelling, modelling_term
 
 #: Row of the speed, whose virtual control is the torque or the current.
 SPEED = 1
@@ -44,6 +44,10 @@ class Cascade(ABC):
         check_modelling(self.plant, self.modelling)
         if self.plant.first != "position" or len(self.plant.states) < 2:
             raise ValueError(f"{self.NAME} positions: it needs a plant whose first state is a position")
+        if self.plant.level in METERED:
+            raise ValueError(
+                f"{self.NAME} commands a torque, a current or a force: it needs another input than a valve"
+            )
 
     @property
     def _electrical(self) -> bool:
