@@ -20,7 +20,7 @@ DECADES = 4.0
 PAGE = (
     HEAD
     + """.best { font-weight: 700 } td .track { min-width: 6em; border-right: 0 }
-td:first-child { white-space: nowrap } td .track i { background: var(--run) }
+td:first-child, td.n { white-space: nowrap } td .track i { background: var(--run) }
 .lost { color: var(--limit) }
 </style></head><body>
 <h1>{{ name }}: the law and its rivals</h1><p class="soft">{{ summary }}</p>
