@@ -177,10 +177,7 @@ def check_names(
     for name in (*listed, *nominal, *(str(limit["name"]) for limit in limits)):
         need(isinstance(name, str) and NAME.fullmatch(name) is not None, "a name must be a plain identifier")
     need(len(set(listed)) == len(listed), "a name stands for two different signals")
-    need(
-        reads(plant) <= set(listed) - set(signals),
-        "the plant reads a name without an assumption",
-    )
+    need(reads(plant) <= set(listed) - set(signals), "the plant reads a name without an assumption")
     unread = {*parameters, *assumed["disturbance"]} - reads(plant)
     need(not unread, f"the plant does not use {', '.join(sorted(unread))}, which the study states")
     foreseen = {*nominal, *assumed["feedforward"]}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from .expression import Expression, run
 from .interval import Interval, total
@@ -181,8 +181,9 @@ class _Algebra:
 
     def larger(self, a: Value, b: Value) -> Value:
         """The larger of two: that one alone where the ranges decide, otherwise anything between both."""
-        if a.range.low >= b.range.high or b.range.low >= a.range.high:
-            return a if a.range.low >= b.range.high else b
+        alone = _alone(a, b)
+        if alone is not None:
+            return alone
         between = b.form + (a.form - b.form).scaled(Interval(0.0, 1.0))
         return self.symbols.node(self.symbols.key("max", *sorted((a.key, b.key))), between, a.range.maximum(b.range))
 
@@ -231,14 +232,25 @@ class _Dual:
     tangent: Form
 
 
+T = TypeVar("T", Value, _Dual)
+
+
 def _dual_quotient(a: _Dual, b: _Dual) -> _Dual:
     ratio = a.range / b.range
     return _Dual(ratio, (a.tangent - b.tangent.scaled(ratio)).scaled(ONE / b.range))
 
 
+def _alone(a: T, b: T) -> T | None:
+    """The larger of two where their ranges decide which it is."""
+    if a.range.low >= b.range.high:
+        return a
+    return b if b.range.low >= a.range.high else None
+
+
 def _dual_larger(a: _Dual, b: _Dual) -> _Dual:
-    if a.range.low >= b.range.high or b.range.low >= a.range.high:
-        return a if a.range.low >= b.range.high else b
+    alone = _alone(a, b)
+    if alone is not None:
+        return alone
     between = b.tangent + (a.tangent - b.tangent).scaled(Interval(0.0, 1.0))
     return _Dual(a.range.maximum(b.range), between)
 

@@ -167,6 +167,12 @@ def wheel(sensor="speed", level="flow", **parameters):
     }  # fmt: skip
 
 
+def exactly(**tolerances):
+    """Numbers of a wheel without tolerances but these."""
+    known = {name: p for name, p in defaults("flow").items() if p.tolerance}
+    return {n: {"value": p.value, "unit": p.unit, "tolerance": tolerances.get(n, 0.0)} for n, p in known.items()}
+
+
 def gains_of(problem, **given):
     (member,) = problem.members
     return tuple(given.get(i.name, 0.0 if i.name.startswith("gamma") else i.low) for i in member.ranges)
@@ -214,11 +220,7 @@ def test_a_wheel_agrees_with_an_independent_adaptive_integrator():
 
 def test_a_wheel_without_a_sensor_of_pressure_is_proved_where_little_is_uncertain():
     """At the level of flow, uphill; the checker decides it, and refuses softer oil. A run stays inside."""
-    exact = {
-        n: {"value": p.value, "unit": p.unit, "tolerance": 0.0} for n, p in defaults("flow").items() if p.tolerance
-    }
-    exact["bulk_modulus"]["tolerance"] = 0.05
-    problem = assemble(study_from(wheel(**exact)))
+    problem = assemble(study_from(wheel(**exactly(bulk_modulus=0.05))))
     (member,) = problem.members
     values = gains_of(problem, beta_1=0.02, gamma_1=10.0)
     found = certificate(member, values, refine=True)
@@ -239,10 +241,7 @@ def test_a_wheel_without_a_sensor_of_pressure_is_proved_where_little_is_uncertai
 
 def test_a_wheel_goes_through_a_file():
     """Fixed gains through the whole pipeline, decided by the checker from the text."""
-    exact = {
-        n: {"value": p.value, "unit": p.unit, "tolerance": 0.0} for n, p in defaults("flow").items() if p.tolerance
-    }
-    data = wheel(**exact)
+    data = wheel(**exactly())
     fixed = {"beta_1": 0.02, "gamma_1": 10.0, "phi_1": 1.0}
     data["controller"]["gains"] = {name: {"value": value} for name, value in fixed.items()}
     result = design(study_from(data), Options(), Progress())

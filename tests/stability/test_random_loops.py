@@ -13,19 +13,7 @@ import pytest
 from known_answers import claim_of, verdict
 from scipy.linalg import expm
 
-from stability import (
-    Bounds,
-    Failure,
-    Gains,
-    Impulse,
-    Interval,
-    LoopModel,
-    Observer,
-    Row,
-    certify_impulse,
-    checker,
-    from_casadi,
-)
+from stability import Bounds, Failure, Gains, Impulse, Interval, LoopModel, Observer, Row, certify_impulse, from_casadi
 
 #: Fractions of a period in which the attack may change its mind, and periods that it has.
 FRACTIONS, PERIODS = 8, 200
@@ -375,7 +363,9 @@ def largest_ratio(case: Case, seed: int, exactly: bool) -> float | None:
         return None
     assert isinstance(found, Impulse)
     if exactly and case.order <= DECIDED:
-        assert agreed(claim_of(model, case.bounds, case.gains, found, limit=1e30, accuracy=1e30)), seed
+        claim = claim_of(model, case.bounds, case.gains, found, limit=1e30, accuracy=1e30)
+        # a spring and an encoder together are sometimes more than it has time for
+        assert verdict(claim, larger=case.mode is not None and case.bounds.observer is not None), seed
     random = np.random.default_rng([seed, 15])
     late = int(case.bounds.transient / case.bounds.period + 1e-9) * FRACTIONS
     worst = 0.0
@@ -390,15 +380,6 @@ def largest_ratio(case: Case, seed: int, exactly: bool) -> float | None:
             seen = attack.worst(final, start, random)
             worst = max(worst, seen.max() / found.half_widths[0], seen[late:].max(initial=0.0) / found.ultimate[0])
     return worst
-
-
-def agreed(claim: checker.Claim) -> bool:
-    """Whether the checker proves it too, or says that it is larger than it takes on: a spring, an encoder and jitter."""
-    checker.WORK.begin(checker.MAX_PRODUCTS)
-    try:
-        return all(o.verdict == "proved" for o in checker.obligations(claim)[0])
-    except checker.NotProvedError as refusal:
-        return "larger than this checker takes on" in str(refusal)
 
 
 def ratios_of(family: Callable[[int], Case], first: int, count: int, every: int) -> list[float]:
