@@ -17,7 +17,7 @@ from hdmm_opt.simulation import Loop, Run, Scenario
 from stability import Certificate, Gains, Impulse, certify, certify_impulse, checker
 from stability.certificates.impulse import Search
 from stability.certificates.quadratic import Inclusion, prove, search
-from stability.certificates.small_gain import Cut
+from stability.certificates.cut import Partition
 from stability.networks.contracts import Assume, Subsystem, replaced, solve_contracts
 from stability.networks.springs import Coupling, coupled
 
@@ -137,8 +137,8 @@ def growth() -> None:
     searches, checks = [], []
     for name, model, bounds, values, box, cells in ways:
         for count in cells:
-            cut = Cut(1e-9, count, count, count)
-            search = lambda m=model, b=bounds, v=values, w=box, c=cut: Search(m, b, v, w, c).run(b)  # noqa: E731
+            cut = Partition((*[1] * (len(model.rows) - 1), count), {})
+            search = lambda m=model, b=bounds, v=values, w=box, c=cut: Search(m, b, v, w, partition=c).run(b)  # noqa: E731
             made = search()
             assert isinstance(made, Impulse), (name, made)
             claim, told = claim_of(model, bounds, values, made), name.replace("cells", f"{len(made.cells)} cells")

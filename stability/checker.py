@@ -67,6 +67,12 @@ reading: Reads what a file says of a member, and refuses what is not the study's
   Must fail: an assumption narrower than the study, a gain outside its range, a law that reads what it cannot know, a
   plant that does not feel what the study states.
 
+balance: What a mode carries in the motion that is asked for, as the only other row that reads it says.
+
+  Theorem: in M x' = g b + Σ c s + c_0 + what is left, with g, c and c_0 constant and signals s of bounded rate,
+  b* = (M r' - Σ c s - c_0) / g is one of them, and around it what is left acts alone. Must fail: an effect without a
+  sign, a row that two modes balance, what may change counted as constant.
+
 loop: The closed loop around the moving operating point, with the input as it is held.
 
   Theorem: interval enclosures of every coefficient (docs/proof.md). Must fail: a sign of plant or law, a smaller box,
@@ -81,6 +87,11 @@ jitter: An input that acts earlier or later than it should.
   Theorem: while another input acts than the nominal one, for a time of at most the jitter, z' differs by b times the
   change of the input and by what the uncertainty makes of that; so z is kicked by at most an integral of e^{|a| s}.
   Must fail: a larger jitter, one that is longer than the delay.
+
+lead: Sections of lead between the error of an input's row and its proportional part.
+
+  Theorem: o = r e + (1 - r) w and w <- p w + (1 - p) e with r = (a + T)/(f + T), p = f/(f + T) are backward differences
+  of (1 + a s)/(1 + f s). Must fail: other times, a section less, a state that is left out.
 
 turn: One control period of the whole sampled loop: plant, load networks and pending inputs as one exact map.
 
@@ -155,7 +166,7 @@ import re
 import stat
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
@@ -180,6 +191,8 @@ MAX_BYTES, MAX_DIGITS, MAX_EXPONENT, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS 
 MAX_CELLS, MAX_ORDER, MAX_BLOCK, MAX_GROUPS = 64, 24, 4, 400
 #: Largest number of periods in a group, and of periods of delay.
 MAX_GROUP, MAX_DELAY = 2_000, 8
+#: Sections of lead of an input.
+MAX_LEADS = 4
 #: A parameter that may change in a run: faults take effectiveness.
 VARYING = "effectiveness"
 #: A range of an assumption is that of the study to this share: it is written rounded outwards.
@@ -419,6 +432,10 @@ class Table:
     def key(self, *operation: Any) -> int:
         """A number for an operation; the same for the same operator on the same arguments."""
         return self.keys.setdefault(operation, len(self.keys))
+
+    def copy(self) -> Table:
+        """A table of its own with the same symbols."""
+        return Table(dict(self.ranges), dict(self.definitions), dict(self.names), dict(self.keys), self.undecided)
 
     def over(self, form: Form) -> Interval:
         """Range of a form."""
@@ -893,6 +910,21 @@ def reads(program: dict[str, Any], outputs: Iterable[int] | None = None) -> set[
     return names
 
 
+def only(program: dict[str, Any], outputs: list[int]) -> dict[str, Any]:
+    """The program of some entries alone."""
+    needed = set(outputs)
+    for k in range(len(program["operations"]) - 1, -1, -1):
+        operator, *arguments = program["operations"][k]
+        if k in needed and operator not in ("input", "const"):
+            needed.update(arguments)
+    place = {old: new for new, old in enumerate(sorted(needed))}
+    made = []
+    for old in sorted(needed):
+        operator, *arguments = program["operations"][old]
+        made.append([operator, *(arguments if operator in ("input", "const") else (place[k] for k in arguments))])
+    return {"operations": made, "outputs": [place[k] for k in outputs]}
+
+
 # --- shape ---
 
 #: Refuses a value at a place of the file that it does not fit.
@@ -1016,7 +1048,7 @@ def target(value: Any, where: str) -> None:
                 name(part, where)
             plain_number(share, where)
     elif not isinstance(value, Fraction):
-        some("reference", "zero")(value, where)
+        some("reference", "zero", "balance")(value, where)
 
 
 def operation(value: Any, where: str) -> None:
@@ -1125,16 +1157,19 @@ STUDY = entry_of(
 PROGRAM = entry_of({"inputs": listed(text, 0, 200), "operations": listed(operation, 1, MAX_OPERATIONS),
                     "outputs": listed(whole, 1, 64)})  # fmt: skip
 EXACT = listed(ratio, 1, MAX_ROWS)
+MIDDLE = dict.fromkeys(("force", "drive"), listed(EXACT, 1, MAX_ROWS))
 CERTIFICATE = entry_of(
     {"kind": text, "half_widths": EXACT, "input_bound": EXACT,
      "networks": listed(entry_of(dict.fromkeys(("row", "low", "high", "middle", "bound"), ratio) | {"row": name}),
                         0, MAX_ROWS),
-     "force": listed(EXACT, 1, MAX_ROWS), "drive": listed(EXACT, 1, MAX_ROWS), "split": listed(whole, 1, MAX_ROWS),
+     "split": listed(whole, 1, MAX_ROWS),
      "cells": listed(entry_of({"columns": listed(listed(ratio, 1, MAX_ORDER), 1, MAX_ORDER),
                                "blocks": listed(whole, 1, MAX_ORDER), "groups": listed(whole, 1, MAX_GROUPS),
-                               "growth": ratio}), 1, MAX_CELLS),
+                               "growth": ratio}, MIDDLE), 1, MAX_CELLS),
      "envelope": entry_of({"rate": ratio, "ultimate": EXACT})},
-    dict.fromkeys(("guarantee", "observed"), listed(ratio, 3, 3)),
+    dict.fromkeys(("guarantee", "observed"), listed(ratio, 3, 3)) | MIDDLE | {
+        "parts": named(whole, MAX_ROWS), "lags": listed(name, 1, MAX_ROWS),
+    },
 )  # fmt: skip
 MEMBER = entry_of(
     {
@@ -1146,7 +1181,7 @@ MEMBER = entry_of(
             "limits": listed(entry_of({"name": name, "signals": listed(name, 1, MAX_ROWS)}), 1, 16),
             "first": some("position", "speed"),
             "outputs": named(entry_of({"unit": unit, "program": PROGRAM}), 8),
-        }),
+        }, {"leads": whole}),
         "nominal": named(plain_number),
         "gains": listed(entry_of({"name": name, "value": plain_number, "unit": text, "min": plain_number,
                                   "max": plain_number, "meaning": text}), 1, 64),
@@ -1162,7 +1197,8 @@ MEMBER = entry_of(
         "certificate": CERTIFICATE,
         "golden": listed(entry_of(
             dict.fromkeys(("x", "r", "theta", "phi", "u", "theta_next", "phi_next"), listed(plain_number, 1, MAX_ROWS)),
-            {"load": listed(plain_number, 1, 1)}), 20, 100),
+            {"load": listed(plain_number, 1, 1),
+             **dict.fromkeys(("lead", "lead_next"), listed(plain_number, 1, MAX_LEADS * MAX_ROWS))}), 20, 100),
     },
     {"observer": entry_of({"first": plain_number, "second": plain_number})},
 )  # fmt: skip
@@ -1213,21 +1249,25 @@ def shaped(data: dict[str, Any]) -> None:
 
 @dataclass(frozen=True)
 class Gain:
-    """Gains of one controlled row, as intervals; what bounds and starts its load network, as numbers."""
+    """Gains of one controlled row and times of its leads, as intervals; bound and start of its network, as numbers."""
 
     beta: Interval
     epsilon: Interval
     delta: Interval
     sigma: Interval
     gamma: Interval
+    lead: Interval
+    smooth: Interval
     capacity: Fraction
     preload: Fraction
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What a file says of the loop for a part of the inertias' ranges: coordinates, groups of periods, weight."""
+    """What a file says of the loop for a part of the ranges: middles of J and B, coordinates, groups, weight."""
 
+    force: list[list[Fraction]]
+    drive: list[list[Fraction]]
     columns: list[list[Fraction]]
     blocks: list[int]
     groups: list[int]
@@ -1253,8 +1293,6 @@ class Claim:
     period: Fraction
     delay: Fraction
     gains: list[tuple[Fraction, ...]]
-    force: list[list[Fraction]]
-    drive: list[list[Fraction]]
     split: list[int]
     cells: list[Cell]
     half_widths: list[Fraction]
@@ -1273,6 +1311,9 @@ class Claim:
     observer: tuple[Fraction, ...] = ()
     jitter: Fraction = Fraction(0)
     shown: list[Fraction] = field(default_factory=list)
+    leads: int = 0
+    parts: dict[str, int] = field(default_factory=dict)
+    lags: list[int] = field(default_factory=list)
 
     @property
     def measured(self) -> list[Fraction]:
@@ -1288,6 +1329,13 @@ class Claim:
     def networks(self) -> list[int]:
         """Indices of the rows with a load network."""
         return [i for i, gain in zip(self.controlled, self.gains, strict=True) if gain[4] > 0]
+
+    def places_of_leads(self, row: int) -> list[int]:
+        """Which of all sections of lead act on the error of a row; those of an input stand together."""
+        if row not in self.input_map:
+            return []
+        first = self.leads * self.input_map.index(row)
+        return list(range(first, first + self.leads))
 
     @property
     def whole(self) -> int:
@@ -1305,8 +1353,11 @@ class Claim:
         return self.whole + (self.share > 0 or self.jitter > 0)
 
 
-def cell_of(entry: dict[str, Any]) -> Cell:
-    """One cell of a certificate; how large it must be is decided where the loop is built."""
+def cell_of(entry: dict[str, Any], middle: dict[str, Any], n: int, m: int) -> Cell:
+    """One cell of a certificate of n rows and m inputs; how large it must be is decided where the loop is built.
+
+    The middles of J and B are in `middle`, an entry that all cells may share.
+    """
     columns = entry["columns"]
     need(isinstance(columns, list) and 1 <= len(columns) <= MAX_ORDER, f"coordinates are of 1 to {MAX_ORDER} states")
     blocks = [index(v, MAX_BLOCK + 1, "a block") for v in entry["blocks"]]
@@ -1315,7 +1366,17 @@ def cell_of(entry: dict[str, Any]) -> Cell:
     need(1 <= len(groups) <= MAX_GROUPS and min(groups) >= 1, f"1 to {MAX_GROUPS} groups of periods are summed")
     growth = number(entry["growth"], "growth")
     need(growth >= 1, "the weight of a period is 1 or more")
-    return Cell([numbers(row, len(columns), "coordinates") for row in columns], blocks, groups, growth)
+    force, drive = (
+        [numbers(row, size, key) for row in listed_of(middle[key], n, key)]
+        for key, size in (("force", n), ("drive", m))
+    )
+    return Cell(force, drive, [numbers(row, len(columns), "coordinates") for row in columns], blocks, groups, growth)
+
+
+def listed_of(value: Any, count: int, what: str) -> list[Any]:
+    """A list of a given length."""
+    need(isinstance(value, list) and len(value) == count, f"{what} must have {count} rows")
+    return value
 
 
 # --- reference ---
@@ -1400,6 +1461,8 @@ MEANINGS = {
     "sigma": "leakage of the adaptation", "gamma": "gain of the load network",
     "phi": "largest estimate of the load network", "preload": "estimate of the load network at the start",
 }  # fmt: skip
+#: The same of the leads of an input.
+TIMES = {"lead": "time of each section of lead", "smooth": "time of their filters"}
 #: Key of a stroke by the unit of the first state.
 STROKE = {"m": "stroke_m", "rad": "stroke_rad", "m/s": "stroke_m_s", "rad/s": "stroke_rad_s"}
 
@@ -1492,6 +1555,8 @@ def _assumed(
 def _gains(entry: dict[str, Any], claim: Claim, units: dict[str, str]) -> None:
     """Units and meanings of the gains: β maps Q to what the row asks for, ε θ̂ has the unit of β."""
     order = [f"{kind}_{k + 1}" for k in range(len(claim.controlled)) for kind in MEANINGS]
+    led = [k for k, row in enumerate(claim.controlled) if claim.leads and row in claim.input_map]
+    order += [f"{kind}_{k + 1}" for k in led for kind in TIMES]
     need([gain["name"] for gain in entry["gains"]] == order, "the gains stand in another order")
     for gain in entry["gains"]:
         kind, _, place = gain["name"].partition("_")
@@ -1501,12 +1566,10 @@ def _gains(entry: dict[str, Any], claim: Claim, units: dict[str, str]) -> None:
         control = following[0] if following else claim.limits[0]["unit"]
         ratio = f"({control})/({units[state]})"
         unit = {"beta": ratio, "epsilon": f"sqrt({ratio}/s)/({units[state]})", "delta": "1", "sigma": "1/s",
-                "gamma": f"{ratio}/s", "phi": control, "preload": control}[kind]  # fmt: skip
+                "gamma": f"{ratio}/s", "phi": control, "preload": control}.get(kind, "s")  # fmt: skip
         need(gain["unit"] == unit, f"{gain['name']} must be in {unit}")
-        need(
-            gain["meaning"] == f"{MEANINGS[kind]} of subsystem {place} ({state})",
-            f"{gain['name']} means something else",
-        )
+        meaning = f"{ {**MEANINGS, **TIMES}[kind] } of subsystem {place} ({state})"
+        need(gain["meaning"] == meaning, f"{gain['name']} means something else")
 
 
 def _terms(claim: Claim, study: dict[str, Any]) -> None:
@@ -1679,7 +1742,10 @@ def different(vectors: list[dict[str, Any]], claim: Claim) -> None:
     """Refuse golden vectors that repeat each other in what the law reads, or that never move a result."""
     named = {name for term in claim.law for name in reads(term)} | {"r0"}
     kept = [k for k in range(4) if f"r{k}" in named]
-    seen = {(tuple(v["x"]), tuple(v["r"][k] for k in kept), tuple(v["theta"]), tuple(v["phi"])) for v in vectors}
+    seen = {
+        (tuple(v["x"]), tuple(v["r"][k] for k in kept), tuple(v["theta"]), tuple(v["phi"]), tuple(v.get("lead", ())))
+        for v in vectors
+    }
     need(len(seen) == len(vectors), "golden vectors must differ in what the law reads")
     need(len({tuple(v["u"]) for v in vectors}) > len(vectors) // 2, "golden vectors must move the input")
 
@@ -1816,11 +1882,24 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     transient = number(study["validation"]["transient_s"], "transient_s")
     need(rate > 0 and transient >= 0, "the control rate must be positive, the transient not negative")
     split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]]
-    cells = [cell_of(cell) for cell in certificate["cells"]]
-    covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod(split)
-    need(covered, "the cells do not cover the inertias")
-    gains = gains_of(entry["gains"], controlled, study, entry["name"])
+    parts = {name: index(v, MAX_CELLS + 1, "parts") for name, v in certificate.get("parts", {}).items()}
+    cut = set(parts) <= set(assumed["parameter"]) - {"effectiveness"} and min(parts.values(), default=2) > 1
+    need(cut, "only ranges of constants are cut into parts, and into two or more")
+    cells = [cell_of(cell, cell if parts else certificate, n, m) for cell in certificate["cells"]]
+    alone = all(("force" in c, "drive" in c) == (bool(parts), bool(parts)) for c in certificate["cells"])
+    need(
+        alone and ("force" in certificate, "drive" in certificate) == (not parts, not parts),
+        "the middles of a loop are stated once: of each cell where constants are cut, else of all",
+    )
+    covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod([*split, *parts.values()])
+    need(covered, "the cells do not cover the inertias and the constants that are cut")
+    leads = index(model["leads"], MAX_LEADS + 1, "a number of leads") if "leads" in model else 0
+    need(leads > 0 or "leads" not in model, "a model without leads does not name them")
+    gains = gains_of(entry["gains"], controlled, input_map if leads else [], study, entry["name"])
     own = [states[i] for i, gain in zip(controlled, gains, strict=True) if gain[4] > 0]
+    lags = [states.index(name) if name in states else -1 for name in certificate.get("lags", [])]
+    following = all(i >= 0 and isinstance(rows[i]["target"], int) and i not in controlled for i in lags)
+    need(following and len(set(lags)) == len(lags), "a lag is of a row without law that follows another")
     networks = certificate["networks"]
     need([given["row"] for given in networks] == own, "the networks are not those of the gains")
     delay = number(controller["delay_s"], "delay_s")
@@ -1838,9 +1917,7 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
         reference=reference_bounds(entry["reference"]),
         noise=[magnitude(assumed["noise"][s]) for s in states],
         initial=[magnitude(assumed["initial"][s]) for s in states],
-        period=1 / rate, delay=delay, gains=gains, split=split, cells=cells,
-        force=[numbers(row, n, "force") for row in listed_of(certificate["force"], n, "force")],
-        drive=[numbers(row, m, "drive") for row in listed_of(certificate["drive"], n, "drive")],
+        period=1 / rate, delay=delay, gains=gains, split=split, parts=parts, cells=cells,
         half_widths=numbers(certificate["half_widths"], n, "half_widths"),
         input_bound=numbers(certificate["input_bound"], m, "input_bound"),
         demand=[(number(given["low"], "low"), number(given["high"], "high")) for given in networks],
@@ -1851,7 +1928,8 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
         transient=transient,
         feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
         first=model["first"], rest=rest_of(entry["reference"]["segments"], study["reference"]["dwell_s"]),
-        jitter=jitter, observer=watched, shown=numbers(certificate["observed"], 3, "observed") if watched else [],
+        jitter=jitter, leads=leads, lags=lags, observer=watched,
+        shown=numbers(certificate["observed"], 3, "observed") if watched else [],
     )  # fmt: skip
 
 
@@ -1886,12 +1964,6 @@ def rest_of(segments: list[dict[str, Any]], pause: Any) -> tuple[Fraction, Fract
     return number(segments[0]["coefficients"][0], "a coefficient"), knots[-1] - knots[0]
 
 
-def listed_of(value: Any, count: int, what: str) -> list[Any]:
-    """A list of a given length."""
-    need(isinstance(value, list) and len(value) == count, f"{what} must have {count} rows")
-    return value
-
-
 def rows_of(model: dict[str, Any]) -> tuple[list[dict[str, Any]], list[int], list[int]]:
     """The subsystems, indices of those with gains, and the row of each input."""
     rows = model["rows"]
@@ -1902,6 +1974,8 @@ def rows_of(model: dict[str, Any]) -> tuple[list[dict[str, Any]], list[int], lis
         if isinstance(target, dict):
             need(row["controlled"] is False, "a row under the law tracks the reference, zero, or a row")
             row["target"] = {name: number(share, "a row's target") for name, share in target.items()}
+        elif target == "balance":
+            need(row["controlled"] is False, "a row under the law tracks the reference, zero, or a row")
         elif target not in ("reference", "zero"):
             row["target"] = index(target, i, "a row's target")
             need(rows[row["target"]]["controlled"] is True, "a row's target must be a controlled row")
@@ -1955,16 +2029,18 @@ def check_names(
 
 
 def gains_of(
-    entries: list[dict[str, Any]], controlled: list[int], study: dict[str, Any], name: str
+    entries: list[dict[str, Any]], controlled: list[int], led: list[int], study: dict[str, Any], name: str
 ) -> list[tuple[Fraction, ...]]:
-    """β, ε, δ, σ, γ, Φ, φ̂(0) of each controlled row, inside the ranges of the file and of the study."""
+    """β, ε, δ, σ, γ, Φ, φ̂(0), a and f of each controlled row, inside the ranges of the file and of the study."""
     kinds = ("beta", "epsilon", "delta", "sigma", "gamma", "phi", "preload")
     given = {entry["name"]: number(entry["value"], entry["name"]) for entry in entries}
     names = [f"{kind}_{k + 1}" for k in range(len(controlled)) for kind in kinds]
+    names += [f"{kind}_{k + 1}" for k, row in enumerate(controlled) if row in led for kind in ("lead", "smooth")]
     need(set(given) == set(names) and len(entries) == len(names), "the gains do not fit the subsystems")
-    gains = [tuple(given[f"{kind}_{k + 1}"] for kind in kinds) for k in range(len(controlled))]
-    good = all(b > 0 and e >= 0 and d > 0 and s > 0 and g >= 0 and phi >= abs(p) * (g > 0) >= 0
-               for b, e, d, s, g, phi, p in gains)  # fmt: skip
+    gains = [tuple(given.get(f"{kind}_{k + 1}", Fraction(0)) for kind in (*kinds, "lead", "smooth"))
+             for k in range(len(controlled))]  # fmt: skip
+    good = all(b > 0 and e >= 0 and d > 0 and s > 0 and g >= 0 and phi >= abs(p) * (g > 0) >= 0 <= min(times)
+               for b, e, d, s, g, phi, p, *times in gains)  # fmt: skip
     need(good, "gains must be positive, and a preload inside phi")
     ranges = study["controller"]["members"][name]
     need(set(ranges) == set(names), f"the ranges of the gains of {name} are not those of its gains")
@@ -2069,17 +2145,86 @@ def printable(unit: Any) -> bool:
     return isinstance(unit, str) and UNIT_TEXT.fullmatch(unit) is not None
 
 
+# --- balance ---
+
+#: The range of b* is widened by this share of its size; it settles in so many steps.
+WIDER, SETTLE = Fraction(1, 10**6), 12
+
+
+class Balance:
+    """A row in balance: b* in signals and a constant, and what the row feels besides, without deviations."""
+
+    def __init__(
+        self, raw: Form, own: str, mass: Interval, moving: Form, signals: Collection[str], table: Table
+    ) -> None:
+        self.met: Form = {}
+        self.left: Form = {}
+        self.steady = {own, *signals}
+        for symbol, c in raw.items():
+            if symbol in self.steady or not symbol:
+                self._count(symbol, c)
+            elif symbol[0] not in "Qe":
+                self._split(table.expand({symbol: ONE}), c)
+        self._split(moving, neg(mass))
+        effect = self.met.pop(own, ZERO)
+        if effect[0] <= 0 <= effect[1]:
+            raise NotProvedError("what a mode carries has no effect of a known sign")
+        self.value = times(self.met, neg(inverse(effect)))
+
+    def _count(self, symbol: str, part: Interval) -> None:
+        self.met[symbol] = add(self.met.get(symbol, ZERO), part)
+
+    def _split(self, form: Form, factor: Interval) -> None:
+        """Of what may change, the middle counts as constant, and the rest is left."""
+        rest: Form = {}
+        for symbol, c in form.items():
+            if symbol in self.steady or not symbol:
+                middle = down((c[0] + c[1]) / 2)
+                self._count(symbol, mul(factor, (middle, middle)))
+                rest[symbol] = mul(factor, add(c, (-middle, -middle)))
+            elif symbol[0] not in "Qe":
+                rest[symbol] = mul(factor, c)
+        self.left = plus(self.left, rest)
+
+    def range(self, ranges: dict[str, Interval]) -> Interval:
+        """Where b* is for ranges of the signals."""
+        return over(self.value, ranges)
+
+    def rate(self, rates: dict[str, Interval]) -> Interval:
+        """How fast b* moves for rates of the signals."""
+        return over({s: c for s, c in self.value.items() if s}, rates)
+
+
+def widened(span: Interval) -> Interval:
+    """A range with a little room."""
+    room = up(WIDER * max(abs(span[0]), abs(span[1])))
+    return span[0] - room, span[1] + room
+
+
+def inside(inner: Interval, outer: Interval) -> bool:
+    """Whether one range is in another."""
+    return outer[0] <= inner[0] and inner[1] <= outer[1]
+
+
 # --- loop ---
 
 #: Derivatives of the reference that have a bounded rate.
 SIGNALS = ("r0", "r1", "r2")
 
 
-def placed(target: Any) -> dict[str, Fraction]:
+def placed(row: dict[str, Any]) -> dict[str, Fraction]:
     """Coefficients of the signals whose sum is the target of a row that follows no other."""
+    target = row["target"]
     if isinstance(target, dict):
         return target
+    if target == "balance":
+        return {f"@{row['state']}": Fraction(1)}
     return {"r0": Fraction(1)} if target == "reference" else {}
+
+
+def rate_of(row: dict[str, Any]) -> Form:
+    """The rate of the target of a row that tracks nothing but the reference."""
+    return {f"r{int(s[1]) + 1}": (v, v) for s, v in placed(row).items()}
 
 
 def joined(program: dict[str, Any], names: set[str]) -> dict[str, Any]:
@@ -2108,7 +2253,7 @@ class Loop:
         self.claim, self.table = claim, Table()
         self.gain: dict[int, Gain] = {}
         for i, values in zip(claim.controlled, claim.gains, strict=True):
-            wide = [(v * (1 - inflate), v * (1 + inflate)) for v in values[:5]]
+            wide = [(v * (1 - inflate), v * (1 + inflate)) for v in (*values[:5], *values[7:])]
             self.gain[i] = Gain(*wide, capacity=values[5], preload=values[6])
         self.term = dict(zip(claim.controlled, claim.law, strict=True))
         self.half: dict[int, Interval] = {}
@@ -2131,16 +2276,17 @@ class Loop:
             self._name(name, plus({f"w:{name}": ONE}, self.nodes[name].form))
         self.rated, self.quotients = dict(claim.feedforward), set()
         for row in claim.rows:
-            for name in placed(row["target"]):
+            for name in placed(row):
                 if "/" in name and name not in self.quotients:
                     self._quotient(name, *name.split("/", 1))
         for k, bounds in enumerate(claim.reference):
             table.ranges[f"r{k}"] = bounds
             self._name(f"r{k}", {f"r{k}": ONE})
-        for i, bounds in zip(claim.networks, claim.demand, strict=True):
-            table.ranges[f"p{i}"] = bounds
         for i, radius in enumerate(claim.half_widths):
             table.ranges[f"Q{i}"] = symmetric(radius)
+        self.balances = {i: self._balanced(i) for i, row in enumerate(claim.rows) if row["target"] == "balance"}
+        for i, bounds in zip(claim.networks, claim.demand, strict=True):
+            table.ranges[f"p{i}"] = bounds
         for k, error in enumerate(claim.input_bound):
             table.ranges[f"e{k}"] = symmetric(error)
         for i, row in enumerate(claim.rows):
@@ -2149,6 +2295,41 @@ class Loop:
             self._control(i)
         for k, (name, row) in enumerate(zip(claim.inputs, claim.input_map, strict=True)):
             self._name(name, plus(self.kappa(row), {f"e{k}": ONE}))
+
+    def _balanced(self, i: int) -> int:
+        """What row i carries so that the only other row that reads it moves as is asked for; returns that row."""
+        claim, n, state = self.claim, len(self.claim.rows), self.claim.rows[i]["state"]
+        outputs = claim.plant["outputs"]
+        reading = [j for j in range(n) if j != i and state in reads(claim.plant, [outputs[n + j]])]
+        need(len(reading) == 1, f"a state balances the only other row that reads it: {len(reading)} read {state}")
+        (k,) = reading
+        row, own, span = claim.rows[k], f"w:@{state}", ZERO
+        need(row["target"] in ("reference", "zero"), "a balance is of a row that tracks the reference")
+        program = only(joined(claim.plant, self.quotients), [outputs[k], outputs[n + k]])
+        for _ in range(SETTLE):
+            table = self.table.copy()
+            table.ranges[own] = span
+            nodes = dict(self.nodes)
+            for j, form in ((i, {own: ONE}), (k, {s: (v, v) for s, v in placed(row).items()})):
+                whole = plus({f"Q{j}": ONE}, form)
+                nodes[claim.rows[j]["state"]] = Node(
+                    table.key("input", claim.rows[j]["state"]), whole, table.over(whole)
+                )
+            need(reads(program) <= set(nodes), "a row in balance reads a state that is not in it")
+            mass, force = linear(program, nodes, table)
+            found = Balance(force.form, own, mass.range, rate_of(row), self._rates(), table)
+            needed = found.range(table.ranges)
+            if inside(needed, span):
+                self.table.ranges[own] = span
+                self.rated[f"@{state}"] = span, found.rate(self._rates())
+                return k
+            span = widened(needed)
+        raise NotProvedError(f"what {state} carries does not settle")
+
+    def _rates(self) -> dict[str, Interval]:
+        """Rates of the signals whose rate is bounded."""
+        changes = {f"r{k}": self.claim.reference[k + 1] for k in range(3)}
+        return changes | {f"w:{name}": change for name, (_, change) in self.rated.items()}
 
     def _quotient(self, name: str, load: str, parameter: str) -> None:
         """A disturbance of bounded rate over a constant, which is another one."""
@@ -2180,7 +2361,8 @@ class Loop:
         target = self.claim.rows[i]["target"]
         if isinstance(target, int):
             return self.kappa(target)
-        return plus({}, *(times(self._signal(name), (share, share)) for name, share in placed(target).items()))
+        shares = placed(self.claim.rows[i]).items()
+        return plus({}, *(times(self._signal(name), (share, share)) for name, share in shares))
 
     def _signal(self, name: str) -> Form:
         """A derivative of the reference, one; or a disturbance, its middle where its rate has no bound."""
@@ -2269,7 +2451,7 @@ class Loop:
         rates: list[Form] = []
         for i, row in enumerate(claim.rows):
             target = row["target"]
-            own = {} if isinstance(target, int) else placed(target)
+            own = {} if isinstance(target, int) else placed(row)
             known = {k: moving[k] if k in SIGNALS else {"": self.rated.get(k, (ZERO, ZERO))[1]} for k in own}
             parts = [times(known[k], (share, share)) for k, share in own.items()]
             rates.append(self.virtual[target] if isinstance(target, int) else plus({}, *parts))
@@ -2277,9 +2459,23 @@ class Loop:
             if i in self.gain:
                 self.virtual[i] = table.expand(derivative(self.term[i], self._ranges(), moving))
         places = {i: self._driven(i) for i in claim.networks}
-        left = {place: self._demanded(i, place, raw[place], rates[place]) for i, place in places.items()}
+        held = [*places.values(), *self.balances.values()]
+        need(len(set(held)) == len(held), "a row is held by one load network or one mode")
+        carried = {k: self._carried(i, raw[k], self.mass[k]) for i, k in self.balances.items()}
+        left = {place: self._demanded(i, place, raw[place], rates[place]) for i, place in places.items()} | carried
         for i, form in enumerate(self.closed):
             self.disturbance.append(left[i] if i in left else magnitude(self._left(form)))
+
+    def _carried(self, i: int, raw: Form, mass: Interval) -> Fraction:
+        """What is left of a row that the state of row i balances; what that carries at rest."""
+        own, row = f"w:@{self.claim.rows[i]['state']}", self.claim.rows[self.balances[i]]
+        found = Balance(raw, own, mass, rate_of(row), self._rates(), self.table)
+        settled = inside(found.range(self.table.ranges), self.table.ranges[own])
+        need(
+            settled and inside(found.rate(self._rates()), self.rated[own[2:]][1]), "what a mode carries does not settle"
+        )
+        self.resting[own] = found.range({**self.table.ranges, **self.resting})
+        return magnitude(self._left(found.left))
 
     def _left(self, form: Form, known: dict[str, Interval] | None = None) -> Interval:
         """Range of what is neither a deviation nor an input, where some ranges may be known better."""
@@ -2294,8 +2490,7 @@ class Loop:
         """
         claim, table = self.claim, self.table
         place = claim.networks.index(i)
-        changes = {f"r{k}": claim.reference[k + 1] for k in range(3)}
-        changes |= {f"w:{name}": change for name, (_, change) in self.rated.items()}
+        changes = self._rates()
         centres = {s: down((c[0] + c[1]) / 2) for s, c in rate.items() if s in changes}
         shift = {s: (c, c) for s, c in centres.items()}
         met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[row])))
@@ -2484,7 +2679,7 @@ class Jitter:
         forward = exponential_of([*block, *[[Fraction(0)] * (2 * n)] * n]).part(slice(0, n), slice(None))
         grown = [[up(Fraction(v, 1 << FIXED)) for v in row] for row in forward.sizes()]
         self.grown, area = [row[:n] for row in grown], [row[n:] for row in grown]
-        more = [1 + change for change in turn.change]
+        more = turn.more
         worse = [[turn.change[i] * size[i][j] + more[i] * turn.a_spread[i][j] for j in range(n)] for i in range(n)]
         driven = [[more[i] * (abs(v) + w) for v, w in zip(turn.b[i], turn.b_spread[i], strict=True)] for i in range(n)]
         grows = inverse_of(_combined(identity(n), _times(area, worse), -1))
@@ -2505,6 +2700,27 @@ def _combined(left: Sequence[Sequence[Fraction]], right: Matrix, sign: int) -> M
     return [[a + sign * b for a, b in zip(*rows, strict=True)] for rows in zip(left, right, strict=True)]
 
 
+# --- lead ---
+
+def sections(
+    error: list[Interval], gain: Gain, period: Fraction, places: list[int]
+) -> tuple[list[Interval], list[list[Interval]]]:
+    """What the last section gives, and what each w is at the next sample, over all that the controller knows."""
+    every = inverse(_more(gain.smooth, period))
+    direct, rest = mul(_more(gain.lead, period), every), mul(add(gain.smooth, neg(gain.lead)), every)
+    kept, new, following = mul(gain.smooth, every), mul((period, period), every), []
+    for place in places:
+        following.append([mul(v, new) for v in error])
+        following[-1][place] = add(following[-1][place], kept)
+        error = [mul(v, direct) for v in error]
+        error[place] = add(error[place], rest)
+    return error, following
+
+
+def _more(time: Interval, period: Fraction) -> Interval:
+    return time[0] + period, time[1] + period
+
+
 # --- turn ---
 
 #: Sub-steps of a period for outputs.
@@ -2519,24 +2735,26 @@ def split_of(rows: list[list[Interval]]) -> tuple[Matrix, Matrix]:
 
 
 class Turn:
-    """The loop of constant numbers for a part of the inertias' ranges, and what it leaves out.
+    """The loop of constant numbers for a part of the ranges, and what it leaves out.
 
     Everything is in units of the box: z_i of half_widths_i, v_k of input_bound_k, φ̂ - φ* of network_bound_q, time of
-    the period. Z holds z, φ̂ - φ*, the states of an observer, and the pending inputs, newest first; columns of maps are
-    over Z, then pulses on the new inputs, on the networks and on what the observer sees, kicks of jitter to the states,
-    and measurement errors of the states.
+    the period. Z holds z, ζ of lags, φ̂ - φ*, the states of an observer, those of leads, and the pending inputs, newest
+    first; columns of maps are over Z, then pulses on the new inputs, on the networks, on the leads and on what the
+    observer sees, kicks of jitter to the states, and measurement errors of the states.
     """
 
-    def __init__(self, claim: Claim, loop: Loop, masses: list[Interval]) -> None:
+    def __init__(self, claim: Claim, loop: Loop, cell: Cell, masses: list[Interval]) -> None:
         self.claim, self.loop = claim, loop
-        self.n, self.m, self.q = len(claim.rows), len(claim.inputs), len(claim.networks)
+        self.n, self.m, self.q = len(claim.rows) + len(claim.lags), len(claim.inputs), len(claim.networks)
         self.w = 2 if claim.observer else 0
-        self.first = self.n + self.q + self.w
+        self.filters = claim.leads * self.m
+        self.first = self.n + self.q + self.w + self.filters
         self.order = self.first + self.m * claim.pending
         self.kicked, self.turns = (self.n, self.m) if claim.jitter > 0 else (0, 0)
-        self.width = self.m + self.q + self.w + self.kicked + self.n
+        self.width = self.m + self.q + self.filters + self.w + self.kicked + self.n
         self.columns = self.order + self.width
-        self._plant(masses)
+        self._plant(cell, masses)
+        self._lags()
         self._controller()
         self._observer()
         self.jitter = Jitter(self) if claim.jitter > 0 else None
@@ -2544,9 +2762,9 @@ class Turn:
         self._phases()
         self._sample()
 
-    def _plant(self, masses: list[Interval]) -> None:
+    def _plant(self, cell: Cell, masses: list[Interval]) -> None:
         """a, b and how far they may be from the truth; μ; known bounds on what acts."""
-        claim, loop, n, m = self.claim, self.loop, self.n, self.m
+        claim, loop, n, m = self.claim, self.loop, len(self.claim.rows), self.m
         mass = [down(2 / (1 / low + 1 / high)) for low, high in masses]
         self.change = [up(max(m0 / low - 1, 1 - m0 / high)) for m0, (low, high) in zip(mass, masses, strict=True)]
         rate = [claim.period / (m0 * r) for m0, r in zip(mass, claim.half_widths, strict=True)]
@@ -2554,9 +2772,9 @@ class Turn:
         def scaled(found: Interval, taken: Fraction, factor: Fraction) -> tuple[Fraction, Fraction]:
             return taken * factor, up(max(found[1] - taken, taken - found[0], Fraction(0)) * factor)
 
-        force = [[scaled(loop.entry(i, j), claim.force[i][j], rate[i] * claim.half_widths[j]) for j in range(n)]
+        force = [[scaled(loop.entry(i, j), cell.force[i][j], rate[i] * claim.half_widths[j]) for j in range(n)]
                  for i in range(n)]  # fmt: skip
-        drive = [[scaled(loop.closed[i].get(f"e{k}", ZERO), claim.drive[i][k], rate[i] * claim.input_bound[k])
+        drive = [[scaled(loop.closed[i].get(f"e{k}", ZERO), cell.drive[i][k], rate[i] * claim.input_bound[k])
                   for k in range(m)] for i in range(n)]  # fmt: skip
         (self.a, self.a_spread), (self.b, self.b_spread) = (
             ([[v[0] for v in row] for row in part], [[v[1] for v in row] for row in part]) for part in (force, drive)
@@ -2570,35 +2788,67 @@ class Turn:
         pairs = zip(loop.demand_rate, claim.network_bound, strict=True)
         self.moving = [up(claim.period * r / bound) for r, bound in pairs]
 
+    def _lags(self) -> None:
+        """Another state ζ' = a_ii ζ + s_i for each lag: δ s_i acts as δ ζ would, added to z_i wherever that is read."""
+        claim, n, count = self.claim, len(self.claim.rows), len(self.claim.lags)
+        none = [Fraction(0)] * count
+        self.more = [1 + v for v in self.change] + [Fraction(1)] * count
+        self.lagging = [self.change[i] for i in claim.lags]
+        for rows in (self.a, self.a_spread):
+            rows[:] = [[*row, *none] for row in rows]
+        for k, i in enumerate(claim.lags):
+            alone = all(self.loop.entry(i, j) == ZERO for j in range(n) if j != i)
+            need(alone and self.a[i][i] < 0, "a lag reads nothing but what it follows")
+            for j in range(n):
+                self.a_spread[j][n + k] += up(abs(self.a[j][i]) * self.change[i]) if j != i else 0
+            own = [*self.a[i][:n], *none]
+            own[n + k] = self.a[i][i]
+            self.a.append(own)
+            self.a_spread.append([Fraction(0)] * (n + count))
+            self.a_spread[-1][n + k] = up(abs(self.a[i][i]) * self.change[i])
+            self.b.append(list(self.b[i]))
+            self.b_spread.append([Fraction(0)] * self.m)
+        for i in claim.lags:
+            self.change[i] = Fraction(0)
+        self.change += none
+        self.push += none
+
     def _controller(self) -> None:
-        """K, C, G and A of the discrete part: middles and distances from them; how Z(0) follows from Q(0) and φ̂(0)."""
-        claim, loop, n, q = self.claim, self.loop, self.n, self.q
-        scale = [*claim.half_widths, *claim.network_bound]
+        """The discrete part over (ẑ, c, w): middles and distances from them; how Z(0) follows from Q(0) and φ̂(0)."""
+        claim, loop, n, q = self.claim, self.loop, len(self.claim.rows), self.q
+        filtered = [claim.half_widths[row] for row in claim.input_map for _ in range(claim.leads)]
+        scale = [*claim.half_widths, *claim.network_bound, *filtered]
         own = claim.networks
 
-        def action(i: int) -> list[Interval]:
-            """-b_i Q_i - c_i over (z, c)."""
-            row = [mul(neg(loop.half[i]), v) for v in error(i)]
+        def action(i: int, error: list[Interval]) -> list[Interval]:
+            """-b_i times an error, less c_i."""
+            row = [mul(neg(loop.half[i]), v) for v in error]
             if i in own:
                 row[n + own.index(i)] = add(row[n + own.index(i)], (Fraction(-1), Fraction(-1)))
             return row
 
         def error(i: int) -> list[Interval]:
-            """Q_i over (z, c)."""
-            row, target = [ZERO] * (n + q), claim.rows[i]["target"]
+            """Q_i."""
+            row, target = [ZERO] * len(scale), claim.rows[i]["target"]
             row[i] = (Fraction(1), Fraction(1))
-            return (
-                [add(v, neg(w)) for v, w in zip(row, action(target), strict=True)]
-                if isinstance(target, int) else row
-            )  # fmt: skip
+            if not isinstance(target, int):
+                return row
+            return [add(v, neg(w)) for v, w in zip(row, action(target, error(target)), strict=True)]
 
-        acts = [[mul(v, _point(s / claim.input_bound[k])) for v, s in zip(action(row), scale, strict=True)]
-                for k, row in enumerate(claim.input_map)]  # fmt: skip
+        acts, smooths = [], []
+        for k, i in enumerate(claim.input_map):
+            places = [n + q + place for place in claim.places_of_leads(i)]
+            ahead, following = sections(error(i), loop.gain[i], claim.period, places)
+            acts.append(_in_units(action(i, ahead), scale, claim.input_bound[k]))
+            smooths += [_in_units(row, scale, claim.half_widths[i]) for row in following]
         learns = []
         for j, i in enumerate(own):
             rate = mul(loop.gain[i].gamma, _point(claim.period / claim.network_bound[j]))
             learns.append([mul(mul(rate, v), _point(s)) for v, s in zip(error(i), scale, strict=True)])
+        need(all(row[i] == ZERO for row in (*acts, *learns, *smooths) for i in claim.lags), "a lag is not measured")
+        acts, learns, smooths = ([self._spaced(row) for row in part] for part in (acts, learns, smooths))
         (self.act, self.act_spread), (self.learn, self.learn_spread) = split_of(acts), split_of(learns)
+        self.smooth, self.smooth_spread = split_of(smooths)
         starts = []
         for i, row in enumerate(claim.rows):
             start, target = [ZERO] * (n + q), row["target"]
@@ -2607,10 +2857,25 @@ class Turn:
                 start[target] = mul(neg(loop.gain[target].beta), _point(Fraction(1, 2)))
                 if target in own:
                     start[n + own.index(target)] = _point(Fraction(-1))
-            starts.append([mul(v, _point(s / claim.half_widths[i])) for v, s in zip(start, scale, strict=True)])
+            starts.append(
+                [mul(v, _point(s / claim.half_widths[i])) for v, s in zip(start, scale[: n + q], strict=True)]
+            )
+        starts = [self._spaced(row) for row in starts] + [[ZERO] * (self.n + q) for _ in claim.lags]
         self.start, self.start_spread = split_of(starts)
         self.noise = [up(v / r) for v, r in zip(claim.noise, claim.half_widths, strict=True)]
+        self.noise += [Fraction(0)] * len(claim.lags)
         self.blur = [up(loop.term_noise(row) / claim.input_bound[k]) for k, row in enumerate(claim.input_map)]
+
+    @property
+    def followed(self) -> list[tuple[int, int, Fraction]]:
+        """Place of each ζ among the states, the row that it follows, and the largest |δ| of that."""
+        n = len(self.claim.rows)
+        return [(n + k, i, share) for k, (i, share) in enumerate(zip(self.claim.lags, self.lagging, strict=True))]
+
+    def _spaced(self, row: list[Interval]) -> list[Interval]:
+        """A row over (z, …) with a place for the states of lags after z."""
+        n = len(self.claim.rows)
+        return [*row[:n], *[ZERO] * len(self.claim.lags), *row[n:]]
 
     def _observer(self) -> None:
         """What the controller sees of z, over the columns; what is bounded of an observer, and rounding of its gains.
@@ -2652,7 +2917,7 @@ class Turn:
             self.flow[i][:n] = self.a[i]
             for j, row in enumerate(claim.networks):
                 self.flow[i][n + j] = sum((self.b[i][k] * self.direct[k][j] for k in range(m)), Fraction(0))
-                if claim.rows[i]["target"] == row:
+                if i < len(claim.rows) and claim.rows[i]["target"] == row:
                     self.sources[i][n + j] = bounds[j] / claim.half_widths[i]
 
     def turned(self) -> Matrix:
@@ -2676,7 +2941,8 @@ class Turn:
         """What the controller makes of what it sees and of its networks, with a pulse of its own, over the columns."""
         made = [dot(row[: self.n], column) for column in zip(*self.seen, strict=True)]
         for j, value in enumerate(row[self.n :]):
-            made[self.n + j] += value
+            # the states of an observer stand between networks and leads
+            made[self.n + j + (self.w if j >= self.q else 0)] += value
         made[own] += 1
         return made
 
@@ -2722,6 +2988,8 @@ class Turn:
             fold[n + j][n + j] = Fraction(-1)
             kept[n + j] = self._computed(self.learn[j], order + m + j)
             kept[n + j][n + j] += 1
+        for j, row in enumerate(self.smooth):
+            kept[n + q + self.w + j] = self._computed(row, order + m + q + j)
         for i in range(self.w):
             kept[n + q + i] = [dot(self.ahead[i], column) for column in zip(*self.seen[:2], strict=True)]
         moved = ball(kept)
@@ -2740,7 +3008,7 @@ class Turn:
         first = [_sum(row, noise) for row, noise in zip(begin, unit[n + q : 2 * n + q], strict=True)]
         if self.w:  # an observer starts from the first measurement, and at the reference's speed
             first[1] = [Fraction(0)] * width
-        begin = [*begin, *unit[n : n + q], *first[: self.w]]
+        begin = [*begin, *unit[n : n + q], *first[: self.w], *[[Fraction(0)] * width] * self.filters]
         for _ in range(claim.pending):
             for k, row in enumerate(self.act):
                 made = [dot(row[:n], column) for column in zip(*first, strict=True)]
@@ -2756,6 +3024,7 @@ class Turn:
         """
         claim, n, q = self.claim, self.n, self.q
         first = [up(v / r) for v, r in zip(claim.initial, claim.half_widths, strict=True)]
+        first += [Fraction(0)] * len(claim.lags)
         for j, i in enumerate(claim.networks):
             (low, high), preload = claim.demand[j], self.loop.gain[i].preload
             away = max(abs(preload - low), abs(high - preload)) + ROUNDING * abs(preload)
@@ -2763,13 +3032,20 @@ class Turn:
         loose = [dot(row, first) for row in self.start_spread]
         size = [dot(map(abs, row), first) for row in self.start]
         unsure = [up(v) for v in loose] + [Fraction(0)] * q + [up(v) for v in loose[: self.w]]
+        unsure += [Fraction(0)] * self.filters
         felt = [z + w + noise for z, w, noise in zip(size, loose, self.noise, strict=True)] + first[n:]
+        felt += [Fraction(0)] * self.filters
         held = [up(dot(map(abs, self.act[k][:n]), loose) + dot(self.act_spread[k], felt)) for k in range(self.m)]
         return [*first, *self.noise, *self.blur], unsure + held * claim.pending
 
 
 def _sum(*rows: list[Fraction]) -> list[Fraction]:
     return [sum(column, Fraction(0)) for column in zip(*rows, strict=True)]
+
+
+def _in_units(row: list[Interval], units: list[Fraction], own: Fraction) -> list[Interval]:
+    """A row over other units, in its own."""
+    return [mul(v, _point(unit / own)) for v, unit in zip(row, units, strict=True)]
 
 
 def _point(value: Fraction) -> Interval:
@@ -2947,7 +3223,7 @@ class Responses:
         return reach, times_up(times_up(reach, missed), reach)
 
     def _instants(self) -> None:
-        """Rows of the outputs (z, s, v) at both ends of every sub-step, each once; of c, and of an observer's."""
+        """Rows of the outputs (z, s, v) at both ends of every sub-step, each once; of c, w and an observer's."""
         turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
         flow = ball([[*row] for row in turn.flow[:n]])
         direct = ball([[Fraction(0)] * n + row for row in turn.direct])
@@ -2968,8 +3244,9 @@ class Responses:
             self.pairs.append((ends[0], ends[1]))
         rows = [row for part in made for row in part.rows]
         self.count = len(rows)
-        networks = [[Fraction(int(c == n + j)) for c in range(turn.columns)] for j in range(q)]
-        chosen = ball([*networks, *turn.shown, *turn.turned()])
+        places = [*range(n, n + q), *range(turn.first - turn.filters, turn.first)]
+        remembered = [[Fraction(int(c == place)) for c in range(turn.columns)] for place in places]
+        chosen = ball([*remembered, *turn.shown, *turn.turned()])
         self.rows = Ball([*rows, *chosen.rows], max(chosen.error, *(part.error for part in made)))
 
     def _groups(self) -> None:
@@ -3263,7 +3540,7 @@ ROOM = Fraction(1, 1 << 30)
 
 
 class Bounded:
-    """One cell: what y = (z, s, v, c, an observer's) reaches, and how fast what a start makes of it shrinks."""
+    """One cell: what y = (z, s, v, c, w, an observer's) reaches, and how fast what a start makes of it shrinks."""
 
     def __init__(self, turn: Turn, cell: Cell) -> None:
         self.turn, self.cell = turn, cell
@@ -3277,39 +3554,60 @@ class Bounded:
         forced = [v + dot(row, [*pulses, *turn.noise]) for v, row in zip(forced, plain[1], strict=True)]
         first = [*turn.started()[0], Fraction(1)]
         begun = [[dot(row, first) for row in sums[2]] for sums in (plain, weighted)]
-        self.forced = bounded(self.gain[0], forced)
-        self.whole = bounded(self.gain[0], [a + b for a, b in zip(forced, begun[0], strict=True)])
-        self.amplitude = bounded(self.gain[1], begun[1])
-        acted = [dot(row, self.whole) + push for row, push in zip(self.reads[:n], turn.push, strict=True)]
+        whole = bounded(self.gain[0], [a + b for a, b in zip(forced, begun[0], strict=True)])
+        acted = [dot(row, whole) + push for row, push in zip(self.reads[:n], turn.push, strict=True)]
         moved = [dot(row[n:], turn.moving) for row in turn.sources[:n]]
-        self.rates = [up(s + r + p) for s, r, p in zip(self.whole[n : 2 * n], acted, moved, strict=True)]
+        rates = [up(s + r + p) for s, r, p in zip(whole[n : 2 * n], acted, moved, strict=True)]
         if turn.jitter:
-            changes = [v + w for v, w in zip(self.whole[-m:], turn.jitter.changed, strict=True)]
-            self.rates = [up(v + dot(row, changes)) for v, row in zip(self.rates, turn.jitter.sudden, strict=True)]
+            changes = [v + w for v, w in zip(whole[-m:], turn.jitter.changed, strict=True)]
+            rates = [up(v + dot(row, changes)) for v, row in zip(rates, turn.jitter.sudden, strict=True)]
+        self.rates = self._joined(rates)[: len(turn.claim.rows)]
+        self.forced = self._read(bounded(self.gain[0], forced))
+        self.whole, self.amplitude = self._read(whole), self._read(bounded(self.gain[1], begun[1]))
+        n = len(turn.claim.rows)
         self.inputs = [v + late for v, late in zip(self.whole[2 * n : 2 * n + m], turn.late, strict=True)]
-        self.missed = self.whole[2 * n + m : 2 * n + m + turn.q + len(turn.shown)]
+        after = 2 * n + m + turn.q
+        self.missed = self.whole[2 * n + m : after]
+        after += turn.filters
+        self.missed += self.whole[after : after + len(turn.shown)]
+
+    def _joined(self, reached: list[Fraction]) -> list[Fraction]:
+        """Bounds with z as it is, of bounds on y or on rates."""
+        found = list(reached)
+        for place, i, share in self.turn.followed:
+            found[i] = up(found[i] + share * reached[place])
+        return found
+
+    def _read(self, reached: list[Fraction]) -> list[Fraction]:
+        """Bounds on y with z as it is, and without what only lags have."""
+        n, whole, found = len(self.turn.claim.rows), self.turn.n, self._joined(reached)
+        return [*found[:n], *found[whole : whole + n], *found[2 * whole :]]
 
     def _reads(self) -> tuple[Matrix, list[Fraction]]:
-        """S: |ρ| and the pulses on inputs, networks and an observer over y; and what of the pulses is known."""
+        """S: |ρ| and the pulses on inputs, networks, leads and an observer over y; and what of them is known."""
         turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
         rest = [Fraction(0)] * (len(turn.shown) + turn.turns)
         kicks, changed = (turn.jitter.kicks, turn.jitter.changed) if turn.jitter else ([], [])
-        nothing = [Fraction(0)] * q + rest
+        nothing = [Fraction(0)] * (q + turn.filters) + rest
         reads = []
         for i in range(n):
-            more = 1 + turn.change[i]
+            more = turn.more[i]
             row = [more * v for v in turn.a_spread[i]]
             row += [turn.change[i] * int(i == j) for j in range(n)]
             reads.append([*row, *(more * v for v in turn.b_spread[i]), *nothing])
-        known = list(turn.blur) + [Fraction(0)] * (q + turn.w) + [dot(row, changed) for row in kicks]
+        known = list(turn.blur) + [Fraction(0)] * (q + turn.filters + turn.w) + [dot(row, changed) for row in kicks]
         errors = [size / r for size, r in zip(turn.claim.measured, turn.claim.half_widths, strict=True)]
-        for k, row in enumerate([*turn.act_spread, *turn.learn_spread]):
+        errors += [Fraction(0)] * len(turn.claim.lags)
+        for k, row in enumerate([*turn.act_spread, *turn.learn_spread, *turn.smooth_spread]):
             reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:], *rest])
             known[k] += dot(row[:n], errors)
         ahead = [Fraction(0)] * (len(reads[0]) - turn.turns)
         for gain in turn.blind:
             reads.append([*ahead[:-1], gain, *[Fraction(0)] * turn.turns])
         reads += [[*ahead, *row] for row in kicks]
+        for row in reads:
+            for place, i, share in turn.followed:
+                row[place] += share * row[i]
         return [[up(v) for v in row] for row in reads], [up(v) for v in known]
 
     def _gain(self, sums: list[Matrix]) -> Matrix:
@@ -3357,7 +3655,7 @@ def bounded(gain: Matrix, known: list[Fraction]) -> list[Fraction]:
 
 
 class Impulse:
-    """Verdicts on a member: each cell of the inertias' ranges by itself."""
+    """Verdicts on a member: each cell of the ranges by itself."""
 
     def __init__(self, claim: Claim, loop: Loop) -> None:
         self.claim, self.loop = claim, loop
@@ -3367,10 +3665,24 @@ class Impulse:
             WORK.one(
                 (rows * substeps * order * (len(claim.rows) + 1) + 8 * max(cell.groups) * order + 20 * order**3) // COST
             )
-        cuts = [parts_of(mass, count) for mass, count in zip(loop.mass, claim.split, strict=True)]
-        parts = zip(claim.cells, product(*cuts), strict=True)
-        self.cells = [Bounded(Turn(claim, loop, list(masses)), cell) for cell, masses in parts]
+        parts = [
+            (part, own, list(masses))
+            for part, own in self._pieces()
+            for masses in product(*map(parts_of, own.mass, claim.split))
+        ]
+        cells = zip(claim.cells, parts, strict=True)
+        self.cells = [Bounded(Turn(part, own, cell, masses), cell) for cell, (part, own, masses) in cells]
         self.later: dict[int, list[Fraction]] = {}
+
+    def _pieces(self) -> list[tuple[Claim, Loop]]:
+        """The statement with every combination of parts of the constants that are cut, the last one running fastest."""
+        claim = self.claim
+        if not claim.parts:
+            return [(claim, self.loop)]
+        cuts = [parts_of(claim.parameters[name], count) for name, count in claim.parts.items()]
+        chosen = [dict(zip(claim.parts, ranges, strict=True)) for ranges in product(*cuts)]
+        pieces = [replace(claim, parameters={**claim.parameters, **part}) for part in chosen]
+        return [(piece, Loop(piece, ROUNDING)) for piece in pieces]
 
     def contraction(self) -> Fraction:
         """How far the slowest cell is from not contracting, with the weight of its transient."""
@@ -3443,10 +3755,13 @@ class Impulse:
 
 
 def parts_of(whole: Interval, count: int) -> list[Interval]:
-    """A positive range in parts of about equal ratios that cover it."""
+    """A range in parts that cover it: of about equal ratios where it is positive, of equal widths elsewhere."""
     low, high = whole
-    ratio = float(high / low)
-    cuts = [down(low * Fraction(ratio ** (k / count))) for k in range(1, count)]
+    if low > 0:
+        ratio = float(high / low)
+        cuts = [down(low * Fraction(ratio ** (k / count))) for k in range(1, count)]
+    else:
+        cuts = [down(low + (high - low) * k / count) for k in range(1, count)]
     return list(pairwise([low, *(min(max(cut, low), high) for cut in cuts), high]))
 
 
@@ -3496,18 +3811,25 @@ def _golden_one(vector: dict[str, Any], claim: Claim) -> list[tuple[float, Any]]
     known = [name for name in claim.feedforward if name not in claim.nominal]
     foreseen = numbers(vector.get("load", []), len(known), "golden")
     named |= {f"nominal.{name}": float(value) for name, value in zip(known, foreseen, strict=True)}
+    remembered = [float(v) for v in numbers(vector.get("lead", []), claim.leads * len(claim.inputs), "golden")]
+    period, led = float(claim.period), list(remembered)
     virtual: dict[int, float] = {}
     following, errors = [], []
     for j, i in enumerate(claim.controlled):
         target = claim.rows[i]["target"]
         goal = r[0] if target == "reference" else 0.0 if target == "zero" else virtual[target]
-        beta, epsilon, delta, sigma, *_ = (float(g) for g in claim.gains[j])
+        beta, epsilon, delta, sigma, *_, lead, smooth = (float(g) for g in claim.gains[j])
         error, program = x[i] - goal, claim.law[j]
         term = walk(program, named.__getitem__, float, float_apply)[program["outputs"][0]]
-        virtual[i] = -(beta + epsilon * theta[j]) * error / 2 + term - phi[j]
+        acting = error
+        for place in claim.places_of_leads(i):
+            w, every = remembered[place], smooth + period
+            led[place] = (smooth * w + period * acting) / every
+            acting = ((lead + period) * acting + (smooth - lead) * w) / every
+        virtual[i] = -(beta + epsilon * theta[j]) * acting / 2 + term - phi[j]
         errors.append(error)
         step = epsilon * delta * error * error / 2 - delta * sigma * theta[j]
-        following.append(theta[j] + float(claim.period) * step)
+        following.append(theta[j] + period * step)
     asked = [virtual[row] for row in claim.input_map]
     norm, limit = math.hypot(*asked), float(claim.limits[0]["value"])
     wanted = [value * (limit / max(norm, limit)) for value in asked]
@@ -3515,11 +3837,12 @@ def _golden_one(vector: dict[str, Any], claim: Claim) -> list[tuple[float, Any]]
     for j, i in enumerate(claim.controlled):
         gamma, capacity, own = float(claim.gains[j][4]), float(claim.gains[j][5]), _input_of(claim, i)
         held = abs(asked[own]) > abs(wanted[own]) and -errors[j] * asked[own] > 0
-        step = 0.0 if held else float(claim.period) * gamma * errors[j]
+        step = 0.0 if held else period * gamma * errors[j]
         learned.append(min(max(phi[j] + step, -capacity), capacity))
     pairs = list(zip(wanted, numbers(vector["u"], len(wanted), "golden"), strict=True))
     pairs += zip(following, numbers(vector["theta_next"], k, "golden"), strict=True)
     pairs += zip(learned, numbers(vector["phi_next"], k, "golden"), strict=True)
+    pairs += zip(led, numbers(vector.get("lead_next", []), len(led), "golden"), strict=True)
     return pairs
 
 

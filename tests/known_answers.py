@@ -134,14 +134,19 @@ def claim_of(
         period=Fraction(bounds.period),
         delay=Fraction(bounds.delay),
         gains=[
-            tuple(Fraction(v) for v in (g.beta, g.epsilon, g.delta, g.sigma, g.gamma, g.capacity, g.preload))
+            tuple(
+                Fraction(v)
+                for v in (g.beta, g.epsilon, g.delta, g.sigma, g.gamma, g.capacity, g.preload, g.lead, g.smooth)
+            )
             for g in gains
         ],
-        force=[[fraction(v) for v in row] for row in found.force],
-        drive=[[fraction(v) for v in row] for row in found.drive],
-        split=list(found.split),
+        split=list(found.partition.split),
+        parts=dict(found.partition.parts),
+        lags=[next(i for i, row in enumerate(model.rows) if row.state == name) for name in found.lags],
         cells=[
             Cell(
+                [[fraction(v) for v in row] for row in c.force],
+                [[fraction(v) for v in row] for row in c.drive],
                 [[fraction(v, 17) for v in row] for row in c.columns],
                 list(c.blocks),
                 list(c.groups),

@@ -3,6 +3,9 @@
     Q_i = x_i - target_i,   κ_i = -(β_i + ε_i θ̂_i) Q_i / 2 - φ̂_i + m_i,   θ̂_i' = -δ_i σ_i θ̂_i + ε_i δ_i Q_i² / 2
     φ̂_i <- φ̂_i + T γ_i Q_i, kept within ±Φ_i, and left where the limited input would be pushed further into its limit
 
+In the row of an input, behind which the plant has lags and modes that nobody measures, the proportional part acts on
+Q_i through sections of lead (1 + a s)/(1 + f s); `stability/loops/lead.py` has them sampled. They start at zero.
+
 The target of a row is the reference, zero, or the virtual control κ of another row; the input is the κ of the last
 row. The modelling terms m_i are zero in the model-free law, but for m_1 = x_1d' where x_1' = x_2, a position. The
 model-based law fills them in; see `modelling.py`. φ̂_i is the load network of P-4: it finds the demand that nothing else
@@ -13,6 +16,7 @@ Source: Heydari Shahna (2025), ch. 4, and P-1, P-4; sampled form and load networ
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -37,6 +41,8 @@ KINDS: dict[str, tuple[str, float | None]] = {
 }
 #: Gains of a row.
 COUNT = len(KINDS)
+#: Gains of the leads of an input: meaning.
+LEADS = {"lead": "time of each section of lead", "smooth": "time of their filters"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +96,7 @@ class RAC:
 
     @property
     def schema(self) -> tuple[GainSpec, ...]:
-        """β, ε, δ, σ, γ, Φ and φ̂(0) of each controlled row."""
+        """β, ε, δ, σ, γ, Φ and φ̂(0) of each controlled row; a and f of the leads of each input."""
         found = []
         for k, row in enumerate(self.controlled):
             state = self.plant.states[row]
@@ -100,7 +106,24 @@ class RAC:
                     zero=kind not in ("beta", "delta", "sigma"), signed=kind == "preload",
                     meaning=f"{meaning} of subsystem {k + 1} ({state})",
                 ))  # fmt: skip
+        for row in self._led:
+            k = self.controlled.index(row) + 1
+            found += [
+                GainSpec(
+                    name=f"{kind}_{k}",
+                    unit="s",
+                    default=0.0,
+                    zero=True,
+                    meaning=f"{meaning} of subsystem {k} ({self.plant.states[row]})",
+                )
+                for kind, meaning in LEADS.items()
+            ]
         return tuple(found)
+
+    @property
+    def _led(self) -> tuple[int, ...]:
+        """Rows with sections of lead."""
+        return self.plant.input_map if self.plant.leads else ()
 
     def _unit(self, row: int, kind: str) -> str:
         """Units: β maps Q_i to κ_i, ε θ̂ has the unit of β, θ̂ that of ε Q² / (2σ)."""
@@ -151,29 +174,41 @@ class RAC:
 
     @property
     def states(self) -> int:
-        """An adaptive scalar and a load network for each controlled row."""
-        return 2 * len(self.controlled)
+        """An adaptive scalar and a load network for each controlled row; every section of lead."""
+        return 2 * len(self.controlled) + self.plant.leads * len(self._led)
 
     def start(self, x: Sequence[float], gains: Sequence[float]) -> list[float]:
-        """All adaptive scalars start at zero, all load networks at their preload."""
-        return [0.0] * len(self.controlled) + [gains[k] for k in range(COUNT - 1, len(self.schema), COUNT)]
+        """All load networks start at their preload, adaptive scalars and leads at zero."""
+        count = len(self.controlled)
+        preloads = [gains[k] for k in range(COUNT - 1, COUNT * count, COUNT)]
+        return [0.0] * count + preloads + [0.0] * (self.states - 2 * count)
 
     def rows_of(self, values: Sequence[float]) -> tuple[Gains, ...]:
         """A vector of gains as the prover takes them."""
         names = [{"phi": "capacity"}.get(kind, kind) for kind in KINDS]
-        rows = (values[k : k + COUNT] for k in range(0, len(values), COUNT))
-        return tuple(Gains(**dict(zip(names, row, strict=True))) for row in rows)
+        found = []
+        for k, row in enumerate(self.controlled):
+            own = dict(zip(names, values[COUNT * k : COUNT * (k + 1)], strict=True))
+            if row in self._led:
+                own |= dict(zip(LEADS, self._times(row, values), strict=True))
+            found.append(Gains(**own))
+        return tuple(found)
+
+    def _times(self, row: int, gains: Any) -> tuple[Any, Any]:
+        """A and f of the leads of a row, s."""
+        first = COUNT * len(self.controlled) + len(LEADS) * self._led.index(row)
+        return gains[first], gains[first + 1]
 
     def step(self, x: Any, r: Any, z: Any, gains: Any, nominal: Any, load: Any, period: float) -> Any:
         """One control period, as expressions; arguments as in `control/law.py`.
 
         Returns:
-            (u, θ̂ and φ̂ after the period, Q): inputs inside the amplitude limit, shape (m,); shape (2 k,); errors of the
-            controlled rows, shape (k,).
+            (u, θ̂, φ̂ and w after the period, Q): inputs inside the amplitude limit, shape (m,); shape (states,); errors
+            of the controlled rows, shape (k,).
         """
         import casadi as ca
 
-        virtual, errors = self.virtual_controls(x, r, z, gains, nominal, load)
+        virtual, errors, remembered = self._controls(x, r, z, gains, nominal, load, period)
         asked = ca.vertcat(*(virtual[row] for row in self.plant.input_map))
         u = limited(self.plant, asked)
         adapted, learned, count = [], [], len(errors)
@@ -186,7 +221,7 @@ class RAC:
             held = ca.logic_and(ca.fabs(asked[own]) > ca.fabs(u[own]), further)
             estimate = z[count + k] + ca.if_else(held, 0, period * gamma * error)
             learned.append(ca.fmin(ca.fmax(estimate, -phi), phi))
-        return u, ca.vertcat(*adapted, *learned), ca.vertcat(*errors)
+        return u, ca.vertcat(*adapted, *learned, *remembered), ca.vertcat(*errors)
 
     def _input_of(self, row: int) -> int:
         """The input at the end of the chain that a row begins."""
@@ -194,20 +229,36 @@ class RAC:
         return self.plant.input_map.index(row) if following is None else self._input_of(following)
 
     def virtual_controls(
-        self, x: Any, r: Any, z: Any, gains: Any, nominal: Any, load: Any
+        self, x: Any, r: Any, z: Any, gains: Any, nominal: Any, load: Any, period: float = math.inf
     ) -> tuple[dict[int, Any], list[Any]]:
-        """κ_i by row, and Q_i of the controlled rows, before the amplitude limit; arguments as in `step`."""
+        """κ_i by row, and Q_i of the controlled rows, before the amplitude limit; arguments as in `step`.
+
+        Without a period leads pass an error on as it is, as they do once it has stood for long.
+        """
+        return self._controls(x, r, z, gains, nominal, load, period)[:2]
+
+    def _controls(
+        self, x: Any, r: Any, z: Any, gains: Any, nominal: Any, load: Any, period: float
+    ) -> tuple[dict[int, Any], list[Any], list[Any]]:
+        """The same, and what the leads remember after a period."""
         terms = self.terms(x, r, nominal, load)
         virtual: dict[int, Any] = {}
-        errors = []
+        errors: list[Any] = []
+        remembered: list[Any] = []
         for k, i in enumerate(self.controlled):
             target = self.rows[i].target
             goal = virtual[target] if isinstance(target, int) else r[0] if target == "reference" else 0
             errors.append(x[i] - goal)
             first, count = COUNT * k, len(self.controlled)
-            proportional = -(gains[first] + gains[first + 1] * z[k]) * errors[-1] / 2
+            acting = errors[-1]
+            if i in self._led and period < math.inf:
+                place = 2 * count + len(remembered)
+                own = [z[place + j] for j in range(self.plant.leads)]
+                acting, following = _led(acting, own, *self._times(i, gains), period)
+                remembered += following
+            proportional = -(gains[first] + gains[first + 1] * z[k]) * acting / 2
             virtual[i] = proportional + terms[k] - z[count + k]
-        return virtual, errors
+        return virtual, errors, remembered
 
     def loop_model(self) -> LoopModel:
         """Plant and law as data for the prover."""
@@ -224,12 +275,22 @@ class RAC:
             rows=self.rows,
             input_map=plant.input_map,
             inputs=plant.inputs,
+            leads=plant.leads,
             plant=from_casadi(ca.Function("plant", [plant_input], [ca.vertcat(plant.mass, plant.force)]), plant_names),
             law=tuple(
                 from_casadi(ca.Function("term", [law_input], [term]), law_names)
                 for term in self.terms(plant.x, r, nominal, load)
             ),
         )
+
+
+def _led(error: Any, own: Sequence[Any], lead: Any, smooth: Any, period: float) -> tuple[Any, list[Any]]:
+    """What the last section of lead gives, and what all remember."""
+    every, following = smooth + period, []
+    for w in own:
+        following.append((smooth * w + period * error) / every)
+        error = ((lead + period) * error + (smooth - lead) * w) / every
+    return error, following
 
 
 LAW = RAC

@@ -29,10 +29,13 @@ def golden_vectors(loop: Loop, gains: GainSet) -> dict[str, list[dict[str, Any]]
             foreseen = [shared[tick, 4 * n + k]] if problem.foreseeing else []
             load = foreseen or [member.bounds.nominal[name] for name in member.plant.disturbances]
             u, following, _ = law(x, r, z, list(gains[member.name]), nominal, load)
-            theta, phi = np.split(z, 2)
-            theta_next, phi_next = np.split(np.array(following).ravel(), 2)
+            ends = np.cumsum([len(member.model.controlled)] * 2)
+            theta, phi, lead = np.split(z, ends)
+            theta_next, phi_next, lead_next = np.split(np.array(following).ravel(), ends)
             entry = {"x": x, "r": r, "theta": theta, "phi": phi, "u": np.array(u).ravel(), "theta_next": theta_next,
                      "phi_next": phi_next}  # fmt: skip
+            if lead.size:
+                entry |= {"lead": lead, "lead_next": lead_next}
             if foreseen:
                 entry["load"] = np.array(foreseen)
             vectors.append({key: [float(v) for v in values] for key, values in entry.items()})

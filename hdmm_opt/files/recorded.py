@@ -67,7 +67,7 @@ def _plant(study: Mapping[str, Any], section: Mapping[str, Any], model: Mapping[
         mass=values[:n], force=values[n:], limits=limits, stroke=tuple(section[STROKE[unit]]),
         outputs={name: _values(entry["program"], symbols)[0] for name, entry in model["outputs"].items()},
         output_units={name: entry["unit"] for name, entry in model["outputs"].items()},
-        load_unit=next(iter(units)), first=model["first"],
+        load_unit=next(iter(units)), first=model["first"], leads=model.get("leads", 0),
     )  # fmt: skip
 
 

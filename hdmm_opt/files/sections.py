@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from stability.certificates.small_gain import Cell
 from stability.networks.contracts import Contract
 from stability.networks.coupling import Tube
 from trajectories import Reference
@@ -117,21 +118,28 @@ def certificate_data(contract: Contract) -> dict[str, Any]:
                 found.networks, found.box.low, found.box.high, found.box.middle, found.box.network_bound, strict=True
             )
         ],
-        "force": _matrix(found.force), "drive": _matrix(found.drive), "split": list(found.split),
+        "split": list(found.partition.split),
         "cells": [
             {"columns": _matrix(cell.columns, FINER), "blocks": list(cell.blocks), "groups": list(cell.groups),
-             "growth": short(cell.growth)}
+             "growth": short(cell.growth), **(_middle(cell) if found.partition.parts else {})}
             for cell in found.cells
         ],
         "envelope": {
             "rate": short(_rate(contract)), "ultimate": [short(v * (1 + ULTIMATE), up=True) for v in found.ultimate]
         },
     }  # fmt: skip
+    # where other constants than inertias are cut, each cell has a middle of its own
+    data |= {"parts": dict(found.partition.parts)} if found.partition.parts else _middle(found.cells[0])
+    data |= {"lags": list(found.lags)} if found.lags else {}
     if found.box.shown.size:
         data["observed"] = [short(v, up=True) for v in found.box.shown]
     if contract.guarantee is not None:
         data["guarantee"] = _tube(contract.guarantee)
     return data
+
+
+def _middle(cell: Cell) -> dict[str, Any]:
+    return {"force": _matrix(cell.force), "drive": _matrix(cell.drive)}
 
 
 def _rate(contract: Contract) -> float:

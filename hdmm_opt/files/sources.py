@@ -51,9 +51,10 @@ def exact_text(problem: Problem) -> str:
 
 
 def _unmeasured(member: Member) -> set[str]:
-    """States that the controller does not measure: a speed that it estimates, and a mode that it leaves to itself."""
-    plant = member.plant
-    return {*plant.modes, *(plant.states[1:2] if member.bounds.observer else ())}
+    """States that the controller does not measure: a speed that it estimates, and what the law does not read."""
+    plant, model = member.plant, member.model
+    read = {model.rows[i].state for i in model.controlled}.union(*(term.inputs for term in model.law))
+    return {*(s for s in plant.states if s not in read), *(plant.states[1:2] if member.bounds.observer else ())}
 
 
 def _listed(problem: Problem, names: Iterable[str]) -> str:

@@ -114,7 +114,7 @@ def _refinement(member: Member, plain: Contract, better: Contract) -> str:
     sizes = [1e3 * float(c.certificate.ultimate[0]) for c in (plain, better)]
     counts = [len(c.certificate.cells) for c in (plain, better)]
     return (
-        f"{member.name}: {sizes[1]:.4g} m{unit} with the inertias in {counts[1]} cells, {sizes[0]:.4g} m{unit} "
+        f"{member.name}: {sizes[1]:.4g} m{unit} with what is constant in {counts[1]} cells, {sizes[0]:.4g} m{unit} "
         f"in {counts[0]}"
     )
 

@@ -22,7 +22,7 @@ NOTHING = 1e-6
 #: Sources below this share of a bound are left out.
 SMALL = 0.005
 #: Gains by which a part of the law is switched off.
-SWITCHES = {"theta": "epsilon", "phi": "gamma"}
+SWITCHES = {"theta": ("epsilon",), "phi": ("gamma",), "lead": ("lead", "smooth")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class Contribution:
     """The figures of a design without a part of its law.
 
     Attributes:
-        part: "theta", "phi", or the name of a modelling term; empty for the whole law.
+        part: "theta", "phi", "lead", or the name of a modelling term; empty for the whole law.
         certified: Certified error of the output, m; None where nothing is proved.
         simulated: Largest error after the transient in the study's scenarios, m; infinite where a run is lost.
     """
@@ -47,10 +47,10 @@ def contributions(problem: Problem, gains: GainSet) -> list[Contribution]:
 
 def _variants(problem: Problem, gains: GainSet) -> Iterator[tuple[str, Problem, GainSet]]:
     yield "", problem, gains
-    for part, kind in SWITCHES.items():
+    for part, kinds in SWITCHES.items():
         off = {
             m.name: tuple(
-                0.0 if item.name.startswith(kind) else value
+                0.0 if item.name.startswith(kinds) else value
                 for item, value in zip(m.ranges, gains[m.name], strict=True)
             )
             for m in problem.members
@@ -94,7 +94,7 @@ def budget_lines(problem: Problem, gains: GainSet, contracts: Contracts) -> list
         own, where = member.gains(gains[member.name]), problem.prefix(member)
         for fine in (False, True):
             search = begun(member.model, bounds, own, member.box, fine=fine)
-            if not isinstance(search, Failure) and search.split == found.split:
+            if not isinstance(search, Failure) and search.partition == found.partition:
                 lines.append(where + _told(budget_of(search, bounds, found)))
                 break
     return lines

@@ -92,7 +92,7 @@ def hydraulic_wheel(
     pushed, flow = drive_force(v, pressure, q), valve_flow(opening, pressure, q)
     rim = (v, "m/s", "reference", q["wheel_mass"], pushed - friction(v, q) - w[0] - w[1])
     spent = area(q) * v + q["leakage"] * pressure
-    line = (pressure, "Pa", 0 if chain else _carried(known), compliance(q), flow - spent)
+    line = (pressure, "Pa", 0 if chain else "balance", compliance(q), flow - spent)
     spool = (opening, "1", 1 if chain else 0, q["valve_lag"], u - opening)
     rows: list[Any] = [rim, line, spool] if chain else [rim, spool, line]
     x, units, targets, mass, force = ([row[k] for row in rows] for k in range(5))
@@ -101,20 +101,10 @@ def hydraulic_wheel(
         inputs=("valve_command",), input_unit="1", disturbances=("traction", "roughness"), parameters=known,
         targets=tuple(targets), controlled=(True, chain, False), input_map=(1 if chain else 0,), x=ca.vertcat(*x), u=u,
         w=w, p=p, mass=ca.vertcat(*mass), force=ca.vertcat(*force),
-        limits=LIMITS, stroke=(-1.0, 1.0), first="speed", carried="wheel_mass",
+        limits=LIMITS, stroke=(-1.0, 1.0), first="speed", carried="wheel_mass", leads=0 if chain else 2,
         outputs={"wheel_torque": q["wheel_radius"] * pushed, "flow": flow, "power": pushed * v},
         output_units={"wheel_torque": "N m", "flow": "m^3/s", "power": "W"},
     )  # fmt: skip
-
-
-def _carried(known: Mapping[str, Parameter]) -> dict[str, float]:
-    """The pressure in the motion that is asked for, in four digits: of a nominal wheel that rolls forwards."""
-    values = {name: entry.value for name, entry in known.items()}
-    asked = {
-        "traction": 1.0, "constant": values["coulomb_friction"], "r0": values["viscous_friction"],
-        "r1": values["wheel_mass"],
-    }  # fmt: skip
-    return {name: float(f"{force / (values['efficiency'] * area(values)):.4g}") for name, force in asked.items()}
 
 
 PLANT = PlantModel(levels=tuple(VALVES), defaults=defaults, build=hydraulic_wheel, sensors=("speed", "pressure"))

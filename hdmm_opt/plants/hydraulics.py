@@ -77,5 +77,6 @@ def friction(v: Any, q: Mapping[str, Any]) -> Any:
     """Friction against a speed, N: viscous, Coulomb's and Stribeck's (Hess and Soom 1990)."""
     import casadi as ca
 
-    more = q["stribeck_friction"] / (1 + (v / q["stribeck_speed"]) ** 2)
-    return q["viscous_friction"] * v + (q["coulomb_friction"] + more) * ca.tanh(v / SPEED)
+    # constant times what may change: a proof knows of a constant that it is one
+    side, more = ca.tanh(v / SPEED), 1 + (v / q["stribeck_speed"]) ** 2
+    return q["viscous_friction"] * v + q["coulomb_friction"] * side + q["stribeck_friction"] * (side / more)

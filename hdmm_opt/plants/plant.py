@@ -6,9 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from stability.loops.model import CONSTANT
+from stability.loops.model import BALANCE, CONSTANT
 
 from .parameter import Parameter
+
+#: Steps of Newton's method for what a mode carries.
+NEWTON = 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +67,7 @@ class Plant:
         targets: For each state what it tracks: "reference", "zero", the index of the row whose virtual control is its
             target, or, where the law does not act, coefficients of r0, r1, r2 (reference, its rate, its acceleration),
             "constant" (1), "DISTURBANCE" and "DISTURBANCE/PARAMETER": their sum is the state's value in the motion
-            that is asked for.
+            that is asked for; or "balance", the value with which the only other row that reads it moves like that.
         controlled: For each state whether the law acts in its row. Shape (n,).
         input_map: For each input the row whose virtual control it is. Shape (m,).
         x, u, w, p: The symbols (CasADi SX columns) of states, inputs, disturbances and parameters.
@@ -81,6 +84,7 @@ class Plant:
             empty for a plant that cannot be a member of a coupling.
         first: Whether the first state is a position or a speed.
         efforts: What a motion asks of it; None where only speed, acceleration and jerk are limited.
+        leads: Sections of lead that a law for it has in the row of an input: lags and modes that stand between.
     """
 
     name: str
@@ -109,12 +113,13 @@ class Plant:
     first: Literal["position", "speed"] = "position"
     efforts: Efforts | None = None
     ratings: Mapping[str, Parameter] = field(default_factory=dict)
+    leads: int = 0
 
     @property
     def modes(self) -> tuple[str, ...]:
         """States that no law acts in and that follow no row: nobody measures them."""
         pairs = zip(self.states, self.targets, strict=True)
-        return tuple(state for state, target in pairs if isinstance(target, Mapping))
+        return tuple(state for state, target in pairs if isinstance(target, Mapping) or target == BALANCE)
 
     @property
     def operating(self) -> tuple[float, ...]:
@@ -176,12 +181,41 @@ class Plant:
 
     def standing(self, loads: Sequence[float]) -> list[float]:
         """The state in the middle of the stroke that is asked for at standstill, at nominal parameters."""
+        import casadi as ca
+
         values = self.values()
         acting = {CONSTANT: 1.0, **dict(zip(self.disturbances, loads, strict=True))}
         acting |= {f"{load}/{name}": acting[load] / v for load in self.disturbances for name, v in values.items() if v}
         place = sum(self.stroke) / 2 if self.first == "position" else 0.0
         held = [target if isinstance(target, Mapping) else {} for target in self.targets[1:]]
-        return [place, *(sum(share * acting.get(name, 0.0) for name, share in own.items()) for own in held)]
+        found = [place, *(sum(share * acting.get(name, 0.0) for name, share in own.items()) for own in held)]
+        for i, target in enumerate(self.targets):
+            if target == BALANCE:
+                r = [place, 0.0, 0.0, 0.0]
+                found[i] = float(ca.evalf(self.balanced(i, ca.DM(r), ca.DM(list(loads)), ca.DM(list(values.values())))))
+        return found
+
+    def balanced(self, i: int, r: Any, w: Any, p: Any) -> Any:
+        """The state of row i with which the only other row that reads it moves as is asked for, as an expression.
+
+        Args:
+            i: Row.
+            r: Reference and its first three derivatives. Shape (4,).
+            w: Disturbances.
+            p: Parameters.
+
+        A few steps of Newton's method: exact where the row is linear in the state on either side of zero.
+        """
+        import casadi as ca
+
+        k = next(j for j in range(len(self.states)) if j != i and ca.depends_on(self.force[j], self.x[i]))
+        missing = self.force[k] - self.mass[k] * (r[1] if k == 0 else 0)
+        x = ca.vertcat(*(r[0] if j == 0 else 0 for j in range(len(self.states))))
+        step = -missing / ca.jacobian(missing, self.x[i])
+        for _ in range(NEWTON):
+            more = ca.substitute([step], [self.x, self.u, self.w, self.p], [x, ca.SX.zeros(self.u.numel()), w, p])[0]
+            x = ca.vertcat(*(x[j] + (more if j == i else 0) for j in range(len(self.states))))
+        return x[i]
 
     def inertia_over_gain(self, i: int) -> float:
         """M_i over the effect of what drives row i, at nominal parameters, at rest in the middle of the stroke.

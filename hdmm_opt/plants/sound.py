@@ -8,7 +8,7 @@ from typing import Any
 
 from stability.checker import NAME, UNIT_TEXT
 from stability.enclosures.expression import Expression
-from stability.loops.model import CONSTANT, SIGNALS
+from stability.loops.model import BALANCE, CONSTANT, SIGNALS
 
 from ..errors import InvalidInputError
 from .parameter import SOURCES, Parameter
@@ -134,6 +134,8 @@ def _check_operations(plant: Plant) -> None:
 
 
 def _check_rows(plant: Plant) -> None:
+    import casadi as ca
+
     if plant.targets[0] != "reference" or not plant.controlled[0]:
         raise _wrong("the first row must track the reference under the law", 'start targets with "reference"')
     for i, target in enumerate(plant.targets):
@@ -145,11 +147,18 @@ def _check_rows(plant: Plant) -> None:
                 parts = "r0, r1, r2, constant, disturbances"
                 rule = f"target {i + 1} is of a row without law, and made of {parts}: got {other!r:.40}"
                 raise _wrong(rule, "correct it")
+        elif target == BALANCE:
+            reading = [j for j in range(len(plant.states)) if j != i and ca.depends_on(plant.force[j], plant.x[i])]
+            if plant.controlled[i] or len(reading) != 1 or plant.targets[reading[0]] != "reference":
+                rule = (
+                    f'target {i + 1}, "balance", is of a row without law whose state one other row reads, which tracks'
+                )
+                raise _wrong(f"{rule} the reference: {len(reading)} read it", "correct it")
         elif target not in ("reference", "zero") and not (
             isinstance(target, int) and 0 <= target < i and plant.controlled[target]
         ):
-            rule = f'target {i + 1} must be "reference", "zero" or a controlled row before it: got {target!r:.20}'
-            raise _wrong(rule, "correct it")
+            rule = f'target {i + 1} must be "reference", "zero", "balance" or a controlled row before it'
+            raise _wrong(f"{rule}: got {target!r:.20}", "correct it")
     for row in plant.input_map:
         if not (0 <= row < len(plant.states) and plant.controlled[row]):
             raise _wrong(f"input_map names controlled rows: got {row}", "correct it")

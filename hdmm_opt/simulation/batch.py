@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stability.loops.model import CONSTANT
+from stability.loops.model import BALANCE, CONSTANT, balance_of
 
 from ..control.law import step_function
 from ..problem import GainSet, Member, Problem
@@ -164,6 +164,7 @@ class Batches:
         """
         names = member.plant.disturbances
         read = {name.partition("/")[0] for row in member.model.rows for name in row.place}
+        read |= set(names) if member.model.balanced else set()
         found = np.zeros((len(names), len(scenarios)))
         for k, name in enumerate(names):
             if name in read:
@@ -200,6 +201,10 @@ def _targets_of(law: Any) -> Any:
     }
     signals |= {f"{load}/{name}": acting[k] / p[j] for k, load in enumerate(plant.disturbances)
                 for j, name in enumerate(plant.parameters)}  # fmt: skip
+    signals |= {
+        balance_of(plant.states[i]): plant.balanced(i, r, acting, p)
+        for i, target in enumerate(plant.targets) if target == BALANCE
+    }  # fmt: skip
     goals = [
         virtual[row.target] if isinstance(row.target, int)
         else sum((share * signals[name] for name, share in row.place.items()), ca.SX(0)) for row in law.rows

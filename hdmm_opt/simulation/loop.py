@@ -209,7 +209,8 @@ class Loop:
             symbols = [ca.SX.sym("x", len(plant.states)), ca.SX.sym("r", 4), ca.SX.sym("z", law.states)]
             load = ca.DM([member.bounds.nominal.get(name, 0.0) for name in plant.disturbances])
             nominal = ca.DM(list(plant.values().values()))
-            virtual, _ = law.virtual_controls(*symbols, ca.DM(list(gains[member.name])), nominal, load)  # type: ignore[attr-defined]
+            own_gains, period = ca.DM(list(gains[member.name])), member.bounds.period
+            virtual, _ = law.virtual_controls(*symbols, own_gains, nominal, load, period)  # type: ignore[attr-defined]
             wanted = ca.Function("demand", symbols, [ca.vertcat(*(virtual[row] for row in plant.input_map))])
             asked = np.array(wanted.map(trace.t.size)(own.x, own.r, own.z))
             found[member.name] = float(np.linalg.norm(asked, axis=0).max())

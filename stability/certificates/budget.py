@@ -12,7 +12,7 @@ from ..loops.deviation import deviation_rows
 from ..loops.model import Bounds
 from ..loops.stack import controller
 from .impulse import Impulse, Search
-from .small_gain import cells_of, closed, small_gain
+from .small_gain import closed, small_gain
 
 Array = NDArray[np.float64]
 
@@ -51,14 +51,14 @@ def budget_of(search: Search, bounds: Bounds, found: Impulse) -> Budget:
     """
     rows = deviation_rows(search.model, bounds, search.gains, found.box)
     control, cells = controller(search.model, search.gains, rows, bounds.period), []
-    for part, known in zip(cells_of(rows, search.split), search.responses, strict=True):
+    for part, known in zip(search.parts(bounds, found.box, rows), search.responses, strict=True):
         assert known is not None
-        uncertain = small_gain(part, known.stack, control, bounds)
+        uncertain = small_gain(part.rows, known.stack, control, bounds)
         reads, push = uncertain.reads, uncertain.push
         n, plain = known.stack.sizes[0], known.plain
         columns = np.hstack([
-            plain.rest[:, :n] * push[:n], plain.rest[:, n:] * rows.demand_rate, plain.pulses * push[n:],
-            plain.noise * np.array(bounds.noise),
+            plain.rest[:, :n] * push[:n], plain.rest[:, n:] * part.rows.demand_rate, plain.pulses * push[n:],
+            plain.noise * np.pad(bounds.noise, (0, len(search.lags))),
         ])  # fmt: skip
         parts = closed(plain, reads, columns)
         assert isinstance(parts, np.ndarray)
@@ -71,12 +71,15 @@ def budget_of(search: Search, bounds: Bounds, found: Impulse) -> Budget:
 def _names(search: Search) -> list[str]:
     model, observed = search.model, search.bounds.observer is not None
     states = [row.state for row in model.rows]
+    lagging = [*states, *(f"{states[i]}'s lag" for i in search.lags)]
     return [
         *(f"what acts on {state}" for state in states),
+        *(f"the lag of {states[i]}" for i in search.lags),
         *(f"rate of what the network of {states[i]} meets" for i in search.own),
         *(f"change of {name} until it acts" for name in model.inputs),
         *(f"rounding of the network of {states[i]}" for i in search.own),
+        *(f"rounding of lead {k + 1} of {name}" for name in model.inputs for k in range(model.leads)),
         *(f"rounding of the observed {state}" for state in states[: 2 if observed else 0]),
-        *(f"jitter, felt by {state}" for state in (states if search.bounds.jitter > 0 else ())),
-        *(f"measurement of {state}" for state in states),
+        *(f"jitter, felt by {state}" for state in (lagging if search.bounds.jitter > 0 else ())),
+        *(f"measurement of {state}" for state in lagging),
     ]

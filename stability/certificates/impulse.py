@@ -4,13 +4,14 @@ Rows of the plant in deviations, divided by a middle inertia, are z' = a z + b v
 
     |ρ_i| <= μ_i |s_i| + (1 + μ_i)( Σ_j σ_ij |z_j| + Σ_k τ_ik |v_k| + D_i ),      s = a z + b v
 
-and the gains of the controller are constant but for pulses that are small multiples of |z| and |c|. With the L1 norms Λ
-of `responses.py`, the non-negative S that these bounds read off y = (z, s, v, c), and y0 what known bounds make of y,
+and the gains of the controller are constant but for pulses that are small multiples of |z|, |c| and |w|. With the L1
+norms Λ of `responses.py`, the non-negative S that these bounds read off y = (z, s, v, c, w), and y0 what known bounds
+make of y,
 
     sup y <= y0 + Λ S sup y   ⇒   sup y <= (I - Λ S)^-1 y0      where some s > 0 has Λ S s < s
 
 (Khammash and Pearson 1991; Dahleh and Diaz-Bobillo 1995, ch. 7). The part that starts at Z(0) without disturbance
-obeys the same with weights growth^periods. Inertias are constant: their ranges may be cut into cells.
+obeys the same with weights growth^periods. The ranges of what is constant may be cut into cells.
 
 Nothing here proves anything; `checker.py` does, in fixed point.
 """
@@ -24,13 +25,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..loops.box import Box, DeviationRows, UnboundedError
-from ..loops.deviation import NOTHING, deviation_rows, first_box, networks, rounded
+from ..loops.deviation import NOTHING, demanded, deviation_rows, first_box, networks, rounded
 from ..loops.model import Bounds, Gains, LoopModel
 from ..loops.responses import Responses, responses
-from ..loops.stack import MAX_DELAY, Controller, Stack, controller, delay_of, wiring
+from ..loops.stack import MAX_DELAY, Controller, Stack, controller, delay_of, wiring, with_lags
 from ..loops.turn import turn
 from .certificate import Certificate, Failure
-from .small_gain import Cell, Cut, cell_of, cells_of, closed, cut_for, late_of, middle_of, ringing_of, small_gain
+from .cut import RINGING, Partition, cells_of, constants_of, cut_for, middles, shared
+from .small_gain import Cell, Uncertain, cell_of, closed, late_of, middle_of, small_gain
 
 Array = NDArray[np.float64]
 
@@ -48,23 +50,21 @@ class Impulse(Certificate):
 
     Attributes:
         box: Where the model was bounded.
-        force: Middle of J. Shape (n, n).
-        drive: Middle of B. Shape (n, m).
-        split: Number of parts of equal ratio of each inertia's range. Length n.
-        cells: One for each combination of parts, the last index running fastest.
+        partition: How the ranges of inertias and other constants are cut.
+        cells: One for each combination of parts, those of the inertias running fastest.
         rates: Bounds on |z_i'|. Shape (n,).
         networks: States of the rows with a load network. Length q.
+        lags: States whose own time constant acts through another state, see `with_lags`.
         estimates: Bounds on their |φ̂|. Shape (q,).
         capacity: What those must stay below. Shape (q,).
     """
 
     box: Box
-    force: Array
-    drive: Array
-    split: tuple[int, ...]
+    partition: Partition
     cells: tuple[Cell, ...]
     rates: Array
     networks: tuple[str, ...]
+    lags: tuple[str, ...]
     estimates: Array
     capacity: Array
 
@@ -79,7 +79,7 @@ def certify_impulse(
         bounds: Assumptions, with a positive period.
         gains: One for each controlled row.
         limit: Largest admissible box, |z_i| <= limit_i. Shape (n,).
-        refine: Cut the ranges of the inertias; tighter, and slower.
+        refine: Cut the ranges of what is constant more finely; tighter, and slower.
 
     Returns:
         The numbers, or why there are none.
@@ -102,7 +102,7 @@ def begun(
     if not 0 <= bounds.jitter <= min(bounds.delay, 0.499 * bounds.period):
         return Failure(reason="the jitter of a delay is at most the delay, and less than half a period")
     try:
-        return Search(model, bounds, gains, limit, cut_for(len(model.rows), ringing=model.rings, fine=fine))
+        return Search(model, bounds, gains, limit, fine=fine)
     except np.linalg.LinAlgError:
         return Failure(reason="the loop has no coordinates in which a period contracts")
     except UnboundedError as error:
@@ -111,7 +111,7 @@ def begun(
 
 @dataclass(frozen=True)
 class _Bound:
-    """What one cell reaches over (z, s, v, c), from S and from what Z(0) is made of.
+    """What one cell reaches over (z, s, v, c), from what is uncertain and from what Z(0) is made of.
 
     The forced part and all of it; |z'|; and the amplitude of what starts at Z(0), with the growth of which it shrinks.
     """
@@ -119,10 +119,19 @@ class _Bound:
     forced: Array
     whole: Array
     rates: Array
-    reads: Array
+    uncertain: Uncertain
     first: Array
     amplitude: Array
     growth: float = 1.0
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Enclosures of a cell, and the middles that its loop is made of."""
+
+    rows: DeviationRows
+    force: Array
+    drive: Array
 
 
 class Search:
@@ -133,39 +142,106 @@ class Search:
         bounds: Assumptions from which the middle of the loop is taken.
         gains: One for each controlled row.
         limit: Largest admissible box.
-        cut: How the ranges of the inertias are cut.
+        fine: Whether ranges are cut finely.
+        partition: How they are cut; chosen where it is left out.
     """
 
-    def __init__(self, model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], limit: Array, cut: Cut) -> None:
+    def __init__(
+        self, model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], limit: Array, *, fine: bool = False,
+        partition: Partition | None = None,
+    ) -> None:  # fmt: skip
         self.model, self.gains, self.limit = model, gains, limit
         self.own = networks(model, gains)
         self.steering, self.direct = wiring(model, self.own)
         start = rounded(np.maximum(np.array(bounds.initial), NOTHING * limit))
         self.bounds, (self.box, self.rows) = bounds, first_box(model, bounds, gains, start)
-        self.split = (1,) * len(model.rows)
-        self.force = np.array([rounded(row) for row in (self.rows.low + self.rows.high) / 2])
-        self.drive = np.array([rounded(row) for row in (self.rows.input_low + self.rows.input_high) / 2])
-        self.split = cut.of(self.rows, self._ringing(bounds))
-        self.responses = self._responses(self.rows, bounds)
+        self.lags = self._lags() if model.rings else ()
+        self.partition = self._partition(bounds, fine=fine) if partition is None else partition
+        self.middles = [_middle_of(rows) for rows in self._pieces(bounds, self.box, self.rows)]
+        self.responses = self._responses(self.parts(bounds, self.box, self.rows), bounds)
 
-    def _ringing(self, bounds: Bounds) -> Array | float:
-        """How much longer rows ring than those of a loop that does not, where the law leaves a mode to itself."""
+    def _lags(self) -> tuple[int, ...]:
+        """Rows that do nothing but to follow what is commanded, with a time constant that is not known exactly."""
+        rows, found = self.rows, []
+        for i, row in enumerate(self.model.rows):
+            reads = np.maximum(np.abs(rows.low[i]), np.abs(rows.high[i]))
+            alone = not np.delete(reads, i).any() and rows.high[i, i] < 0
+            if not row.controlled and not row.place and alone and rows.mass_low[i] < rows.mass_high[i]:
+                found.append(i)
+        return tuple(found)
+
+    def _partition(self, bounds: Bounds, *, fine: bool) -> Partition:
+        """How ranges are cut: where a mode is left to itself, as what each leaves uncertain costs."""
+        whole = (1,) * len(self.model.rows)
         if not self.model.rings:
-            return 1.0
-        (whole,) = self._responses(self.rows, bounds)
-        return 1.0 if whole is None else ringing_of(whole)
+            return Partition(cut_for(len(self.model.rows), fine=fine).of(self.rows), {})
+        (known,) = self._responses([_Part(self.rows, *_middle_of(self.rows))], bounds)
+        if known is None:
+            return Partition(whole, {})
+        inertias = [
+            i for i, (low, high) in enumerate(zip(self.rows.mass_low, self.rows.mass_high, strict=True)) if low < high
+        ]
+        constants = constants_of(self.model, bounds)
+        counts = shared(self._costs(known, bounds, inertias, constants), RINGING[fine])
+        split = dict(zip(inertias, counts, strict=False))
+        parts = zip(constants, counts[len(inertias) :], strict=True)
+        return Partition(
+            tuple(split.get(i, 1) for i in range(len(whole))), {name: count for name, count in parts if count > 1}
+        )
 
-    def _responses(self, rows: DeviationRows, bounds: Bounds) -> list[Responses | None]:
-        return [responses(self._stack(part, bounds)) for part in cells_of(rows, self.split)]
+    def _costs(self, known: Responses, bounds: Bounds, inertias: list[int], constants: list[str]) -> list[float]:
+        """What the spread of each alone adds to the bound on z_1, to first order, as a share of it."""
+        stack, mass = known.stack, middle_of(self.rows)
 
-    def _stack(self, rows: DeviationRows, bounds: Bounds) -> Stack:
-        mass = middle_of(rows)
+        def uncertain(still: Bounds, loose: int = -1) -> tuple[Uncertain, DeviationRows]:
+            rows = deviation_rows(self.model, still, self.gains, self.box)
+            low, high = mass.copy(), mass.copy()
+            if loose >= 0:
+                low[loose], high[loose] = self.rows.mass_low[loose], self.rows.mass_high[loose]
+            rows = replace(rows, mass_low=low, mass_high=high)
+            return small_gain(rows, stack, controller(self.model, self.gains, rows, bounds.period), still), rows
+
+        still = middles(bounds)
+        least, rows = uncertain(still)
+        reached = self._forced(known, least, rows, bounds)
+        found = [uncertain(still, i)[0] for i in inertias] + [uncertain(middles(bounds, name))[0] for name in constants]
+        n, plain = stack.sizes[0], known.plain
+        way = np.concatenate([plain.rest[0, :n], plain.pulses[0]])
+        return [float(way @ ((u.reads - least.reads) @ reached + u.push - least.push) / reached[0]) for u in found]
+
+    def _forced(self, known: Responses, uncertain: Uncertain, rows: DeviationRows, bounds: Bounds) -> Array:
+        """What acts makes of y in a loop without what is uncertain."""
+        n, plain, push = known.stack.sizes[0], known.plain, uncertain.push
+        forced = plain.rest[:, :n] @ push[:n] + plain.rest[:, n:] @ rows.demand_rate
+        noise = np.pad(bounds.noise, (0, len(self.lags)))
+        return np.asarray(forced + plain.pulses @ push[n:] + plain.noise @ noise, dtype=np.float64)
+
+    def _pieces(self, bounds: Bounds, box: Box, rows: DeviationRows) -> list[DeviationRows]:
+        """Enclosures of every combination of parts of the constants."""
+        if not self.partition.parts:
+            return [rows]
+        return [deviation_rows(self.model, own, self.gains, box) for own in self.partition.pieces(bounds)]
+
+    def parts(self, bounds: Bounds, box: Box, rows: DeviationRows) -> list[_Part]:
+        """The cells; `rows` are the enclosures of all of them."""
+        return [
+            _Part(cell, *middle)
+            for piece, middle in zip(self._pieces(bounds, box, rows), self.middles, strict=True)
+            for cell in cells_of(piece, self.partition.split)
+        ]
+
+    def _responses(self, parts: list[_Part], bounds: Bounds) -> list[Responses | None]:
+        return [responses(self._stack(part, bounds)) for part in parts]
+
+    def _stack(self, part: _Part, bounds: Bounds) -> Stack:
+        rows, mass = part.rows, middle_of(part.rows)
         whole, share = delay_of(bounds.delay, bounds.period)
-        return Stack(
-            a=self.force / mass[:, None], b=self.drive / mass[:, None], steering=self.steering, direct=self.direct,
+        made = Stack(
+            a=part.force / mass[:, None], b=part.drive / mass[:, None], steering=self.steering, direct=self.direct,
             control=controller(self.model, self.gains, rows, bounds.period), period=bounds.period, whole=whole,
             share=share, observer=bounds.observer, jitter=bounds.jitter,
         )  # fmt: skip
+        return with_lags(made, self.lags)
 
     def run(self, bounds: Bounds) -> Impulse | Failure:
         """The certificate under some assumptions, which may be other ones than the search was begun with."""
@@ -179,11 +255,14 @@ class Search:
         for _ in range(STEPS):
             known = [r for r in summed if r is not None]
             if len(known) < len(summed):
-                return self._unstable(cells_of(taken, self.split)[summed.index(None)], bounds)
+                return self._unstable(self.parts(bounds, box, taken)[summed.index(None)], bounds)
             known_rows = box is self.box and bounds is self.bounds
             rows = self.rows if known_rows else deviation_rows(self.model, bounds, self.gains, box)
-            parts, control = cells_of(rows, self.split), controller(self.model, self.gains, rows, bounds.period)
-            found = [self._cell(part, r, control, bounds, box) for part, r in zip(parts, known, strict=True)]
+            if (larger := demanded(box, rows)) is not None:
+                box = larger
+                continue
+            parts, control = self.parts(bounds, box, rows), controller(self.model, self.gains, rows, bounds.period)
+            found = [self._cell(part.rows, r, control, bounds, box) for part, r in zip(parts, known, strict=True)]
             solved = [entry for entry in found if isinstance(entry, _Bound)]
             if len(solved) < len(found):
                 return next(entry for entry in found if isinstance(entry, Failure))
@@ -193,7 +272,7 @@ class Search:
                 if _moved(taken, rows) <= MOVED:
                     return self._certificate(rows, known, solved, bounds, box)
                 # an adaptive gain has a middle that depends on the box
-                summed, taken = self._responses(rows, bounds), rows
+                summed, taken = self._responses(parts, bounds), rows
                 continue
             if (needed[0] > self.limit).any():
                 worst = int(np.argmax(needed[0] / self.limit))
@@ -206,7 +285,8 @@ class Search:
     def _needed(self, rows: DeviationRows, solved: list[_Bound], bounds: Bounds) -> list[Array]:
         n, m, q = len(self.limit), len(self.model.inputs), len(self.own)
         whole = np.max([entry.whole for entry in solved], axis=0)
-        _, _, inputs, missed, shown, _ = np.split(whole, np.cumsum((n, n, m, q, self.box.shown.size)))
+        leads = m * self.model.leads
+        _, _, inputs, missed, _, shown, _ = np.split(whole, np.cumsum((n, n, m, q, leads, self.box.shown.size)))
         return [whole[:n], inputs + late_of(rows, bounds), missed, shown]
 
     def _cell(
@@ -218,27 +298,33 @@ class Search:
         uncertain = small_gain(rows, stack, control, bounds)
         reads, push = uncertain.reads, uncertain.push
         first = self._start(rows, bounds, box)
-        plain = known.plain
-        forced = plain.rest[:, :n] @ push[:n] + plain.rest[:, n:] @ rows.demand_rate
-        forced = forced + plain.pulses @ push[n:] + plain.noise @ np.array(bounds.noise)
+        plain, forced = known.plain, self._forced(known, uncertain, rows, bounds)
         begun = plain.begin @ first
         found = closed(plain, reads, np.column_stack([forced, forced + begun]))
         if isinstance(found, Failure):
-            return replace(found, row=n - 1)
+            return replace(found, row=len(self.limit) - 1)
         moved = stack.sources()[:n, n:] @ rows.demand_rate
         rates = found[n : 2 * n, 1] + reads[:n] @ found[:, 1] + push[:n] + moved
         if stack.kicked:
             rates = rates + uncertain.sudden @ (found[-stack.turned :, 1] + uncertain.changed)
-        return _Bound(found[:, 0], found[:, 1], rates, reads, first, found[:, 1])
+        forced, whole = (self._read(stack, uncertain, found[:, k]) for k in range(2))
+        return _Bound(forced, whole, uncertain.whole(stack, rates)[: len(self.limit)], uncertain, first, whole)
+
+    def _read(self, stack: Stack, uncertain: Uncertain, reached: Array) -> Array:
+        """Bounds on y with z as it is, and without what only `stack.lags` have."""
+        n, count = len(self.limit), len(stack.lags)
+        gone = [*range(n, n + count), *range(2 * n + count, 2 * (n + count))]
+        return np.asarray(np.delete(uncertain.whole(stack, reached), gone), dtype=np.float64)
 
     def _shrinking(self, known: Responses, bound: _Bound, bounds: Bounds) -> _Bound:
         """The bound with the transient that is smallest when the bound on the error must hold."""
         late, best = periods_in(bounds.transient, bounds.period), math.inf
         for growth, sums in known.weighted.items():
-            found = closed(sums, bound.reads, (sums.begin @ bound.first)[:, None])
+            found = closed(sums, bound.uncertain.reads, (sums.begin @ bound.first)[:, None])
             if not isinstance(found, Failure) and found[0, 0] * growth**-late < best:
                 best = found[0, 0] * growth**-late
-                bound = replace(bound, amplitude=found[:, 0], growth=growth)
+                amplitude = self._read(known.stack, bound.uncertain, found[:, 0])
+                bound = replace(bound, amplitude=amplitude, growth=growth)
         return bound
 
     def _start(self, rows: DeviationRows, bounds: Bounds, box: Box) -> Array:
@@ -251,7 +337,8 @@ class Search:
             max(abs(g.preload - low), abs(high - g.preload), settled)
             for g, low, high, settled in zip(own, box.low, box.high, rows.settled, strict=True)
         ]
-        return np.concatenate([bounds.initial, released, bounds.noise, rows.noise])
+        none = np.zeros(len(self.lags))
+        return np.concatenate([bounds.initial, none, released, bounds.noise, none, rows.noise])
 
     def _certificate(
         self, rows: DeviationRows, known: list[Responses], solved: list[_Bound], bounds: Bounds, box: Box
@@ -268,15 +355,19 @@ class Search:
         decay = min(math.log(s.growth) for s in solved) / bounds.period
         return Impulse(
             decay=decay, half_widths=box.half_widths, input_bound=box.input_bound, ultimate=settled[:n],
-            effort=sizes[n:], states=sizes[:n], box=box, force=self.force, drive=self.drive,
-            split=self.split, cells=tuple(cell_of(r, s.growth, box) for r, s in zip(known, solved, strict=True)),
+            effort=sizes[n:], states=sizes[:n], box=box, partition=self.partition,
+            cells=tuple(
+                cell_of(r, (part.force, part.drive), s.growth, box, self.model.input_map)
+                for part, r, s in zip(self.parts(bounds, box, rows), known, solved, strict=True)
+            ),
             rates=np.max([s.rates for s in solved], axis=0),
             networks=tuple(self.model.rows[i].state for i in self.own),
+            lags=tuple(self.model.rows[i].state for i in self.lags),
             capacity=np.array([g.capacity for g in self.gains if g.gamma > 0]),
             estimates=np.max(np.abs([box.low, box.high]), axis=0) + box.network_bound,
         )  # fmt: skip
 
-    def _unstable(self, part: DeviationRows, bounds: Bounds) -> Failure:
+    def _unstable(self, part: _Part, bounds: Bounds) -> Failure:
         """Why the loop of a cell has no summable responses."""
         stack = self._stack(part, bounds)
         poles = np.linalg.eigvals(turn(stack, 1).image[:, : stack.order])
@@ -287,6 +378,12 @@ class Search:
         else:
             text = f"no coordinates are found in which the loop contracts at {rate:g} Hz"
         return Failure(reason=text, row=len(self.limit) - 1)
+
+
+def _middle_of(rows: DeviationRows) -> tuple[Array, Array]:
+    """Middles of J and B, as a file carries them."""
+    force = np.array([rounded(row) for row in (rows.low + rows.high) / 2])
+    return force, np.array([rounded(row) for row in (rows.input_low + rows.input_high) / 2])
 
 
 def _moved(before: DeviationRows, after: DeviationRows) -> float:

@@ -1,9 +1,9 @@
-"""Cells of the inertias' ranges, what is uncertain in one, and the closed inequality sup y <= y0 + Λ S sup y."""
+"""What is uncertain in a cell, and the closed inequality sup y <= y0 + Λ S sup y."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from itertools import product
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,70 +21,21 @@ Array = NDArray[np.float64]
 LARGEST = 0.999
 
 
-@dataclass(frozen=True)
-class Cut:
-    """How the ranges of the inertias are cut into parts of equal ratios.
-
-    Attributes:
-        width: Half the width that a part may have, as a share of its middle.
-        most: Parts of one range at most.
-        cells: Parts of all ranges together at most.
-        more: The same where fewer would leave a part wider than `WIDE`.
-    """
-
-    width: float
-    most: int
-    cells: int
-    more: int
-
-    def of(self, rows: DeviationRows, ringing: Array | float = 1.0) -> tuple[int, ...]:
-        """Number of parts of each range, where what a part leaves uncertain counts `ringing` times. Shape (n,)."""
-        wide = np.log(rows.mass_high / rows.mass_low) / 2 * ringing
-        counts = np.clip(np.ceil(wide / self.width), 1, self.most)
-        while counts.prod() > self.cells:
-            after = np.where(counts > 1, wide / np.maximum(counts - 1, 1), np.inf)
-            if after.min() > WIDE and counts.prod() <= self.more:
-                break
-            counts[np.argmin(after)] -= 1
-        return tuple(int(v) for v in counts)
-
-
-#: What a push makes of the rate of its own row in a loop that does not ring, over the push, is at most this.
-CALM = 2.5
-#: Half of a part's width, as a share of its middle, that is wide for a refined certificate.
-WIDE = 0.06
-#: For candidates of a search; for a certificate that is refined, and with more rows, of which the checker takes less.
-COARSE, FINE, FEWER, MANY = Cut(0.1, 4, 4, 4), Cut(0.008, 12, 12, 24), Cut(0.008, 12, 8, 8), 4
-#: The same of a loop with a mode that the law leaves to itself.
-RINGING = Cut(0.1, 8, 8, 8), Cut(0.008, 10, 10, 10)
-
-
-def cut_for(rows: int, *, ringing: bool, fine: bool) -> Cut:
-    """How a loop of so many rows is cut."""
-    if ringing:
-        return RINGING[fine]
-    if not fine:
-        return COARSE
-    return FEWER if rows > MANY else FINE
-
-
-def ringing_of(whole: Responses) -> Array:
-    """How much longer each row's rate answers to a push of its own than in a loop that does not ring. Shape (n,)."""
-    n = whole.stack.sizes[0]
-    return np.asarray(np.maximum(1.0, np.diag(whole.plain.rest[n : 2 * n]) / CALM), dtype=np.float64)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """What the checker needs to know of the loop for a part of the inertias' ranges.
+    """What the checker needs to know of the loop for a part of the ranges.
 
     Attributes:
+        force: Middle of J. Shape (n, n).
+        drive: Middle of B. Shape (n, m).
         columns: Coordinates V in which a period contracts, over Z in units of the box. Shape (order, order).
         blocks: Sizes of their blocks.
         groups: Numbers of periods whose responses are summed together.
         growth: Weight of a period in the transient.
     """
 
+    force: Array
+    drive: Array
     columns: Array
     blocks: tuple[int, ...]
     groups: tuple[int, ...]
@@ -106,57 +57,72 @@ class Uncertain:
     """What is uncertain of a loop.
 
     Attributes:
-        reads: S over y = (z, s, v, c, what is bounded of an observer, changes of inputs): ρ, then pulses.
+        reads: S over y = (z, s, v, c, w, what is bounded of an observer, changes of inputs): ρ, then pulses.
         push: Their known part.
         sudden: What jitter makes of |z'| for a change of 1 of each input. Shape (n, m).
         changed: The known part of those changes. Shape (m,).
+        lagging: |δ| of each row of `stack.lags`: so many times ζ is added to its z.
     """
 
     reads: Array
     push: Array
     sudden: Array
     changed: Array
+    lagging: Array
+
+    def whole(self, stack: Stack, reached: Array) -> Array:
+        """Y with z as it is, of bounds on y; shapes alike."""
+        found, first = reached.copy(), stack.sizes[0] - len(stack.lags)
+        for k, (i, share) in enumerate(zip(stack.lags, self.lagging, strict=True)):
+            found[i] += share * reached[first + k]
+        return found
 
 
 def small_gain(rows: DeviationRows, stack: Stack, ctl: Controller, bounds: Bounds) -> Uncertain:
     """What is uncertain of the loop; `ctl` is the controller in the box."""
-    n, m, q = stack.sizes
+    _, m, q = stack.sizes
+    n, more_states = len(rows.mass_low), len(stack.lags)
     mass = middle_of(rows)
     change = np.maximum(mass / rows.mass_low - 1, 1 - mass / rows.mass_high)
     per, more = 1 / mass[:, None], (1 + change)[:, None]
-    spread = np.maximum(np.abs(rows.low * per - stack.a), np.abs(rows.high * per - stack.a))
-    loose = np.maximum(np.abs(rows.input_low * per - stack.b), np.abs(rows.input_high * per - stack.b))
-    first = 2 * n + m
-    reads = np.zeros((n + stack.pulses, first + q + stack.shown + stack.turned))
+    a, b = stack.a[:n, :n], stack.b[:n]
+    spread = np.maximum(np.abs(rows.low * per - a), np.abs(rows.high * per - a))
+    loose = np.maximum(np.abs(rows.input_low * per - b), np.abs(rows.input_high * per - b))
+    known = (1 + change) * (rows.disturbance / mass + (np.abs(b) + loose) @ late_of(rows, bounds))
+    own = list(stack.lags)
+    lagging = change[own]
+    if more_states:  # δ ζ is added to z wherever it is read, but for its own row
+        change[own] = 0.0
+        felt = np.abs(stack.a[:, own]) * lagging
+        felt[own, range(more_states)] = 0.0
+        spread = np.pad(spread, ((0, more_states), (0, more_states)))
+        spread[:, n:] += felt
+        spread[range(n, n + more_states), range(n, n + more_states)] = np.abs(np.diag(stack.a)[own]) * lagging
+        loose, more = np.pad(loose, ((0, more_states), (0, 0))), np.vstack([more, np.ones((more_states, 1))])
+        change, known = np.pad(change, (0, more_states)), np.pad(known, (0, more_states))
+        n += more_states
+    first, last = 2 * n + m, 2 * n + m + q + stack.leads
+    reads = np.zeros((n + stack.pulses, last + stack.shown + stack.turned))
     reads[:n, :n], reads[:n, n : 2 * n], reads[:n, 2 * n : first] = more * spread, np.diag(change), more * loose
-    reads[n : n + m, :n], reads[n : n + m, first : first + q] = ctl.feedback_spread, ctl.network_spread
-    reads[n + m : n + m + q, :n], reads[n + m : n + m + q, first : first + q] = ctl.entry_spread, ctl.keep_spread
+    wrong = np.vstack([ctl.act_spread, ctl.learn_spread, ctl.smooth_spread])
+    wrong = np.insert(wrong, [n - more_states] * more_states, 0.0, axis=1)
+    corrections = n + len(wrong)
+    reads[n:corrections, :n], reads[n:corrections, first:last] = wrong[:, :n], wrong[:, n:]
     if stack.observer is not None:
         corrected = (ROUNDED.high - 1) * np.array([stack.observer.first, stack.observer.second])
-        reads[n + m + q : n + m + q + stack.watched, first + q + stack.shown - 1] = corrected
+        reads[corrections : corrections + stack.watched, last + stack.shown - 1] = corrected
     kicks, sudden, changed = np.zeros((stack.kicked, m)), np.zeros((n, m)), bounds.period * rows.drift
     if stack.kicked:  # of the input and, as long as it lasts, of what the uncertainty makes of that and of the kick
         area, worse = stack.meanwhile()[1], change[:, None] * np.abs(stack.a) + more * spread
         driven = more * (np.abs(stack.b) + loose)
         kicks = np.linalg.solve(np.eye(n) - area @ worse, area @ driven)
         sudden = np.asarray(driven + (worse + np.abs(stack.a)) @ kicks, dtype=np.float64)
-        reads[n + m + q + stack.watched :, first + q + stack.shown :] = kicks
-    drift = (np.abs(stack.b) + loose) @ late_of(rows, bounds)
-    push = np.concatenate([
-        (1 + change) * (rows.disturbance / mass + drift), rows.noise + ctl.feedback_spread @ rows.measured,
-        ctl.entry_spread @ rows.measured, np.zeros(stack.watched), kicks @ changed,
-    ])  # fmt: skip
-    return Uncertain(reads=reads, push=push, sudden=sudden, changed=changed)
-
-
-def cells_of(rows: DeviationRows, split: tuple[int, ...]) -> list[DeviationRows]:
-    """The enclosures with each inertia's range cut into parts of equal ratios, every combination."""
-    low, step = rows.mass_low, (rows.mass_high / rows.mass_low) ** (1 / np.array(split))
-    parts = []
-    for index in product(*(range(count) for count in split)):
-        begin = low * step ** np.array(index)
-        parts.append(replace(rows, mass_low=begin, mass_high=begin * step))
-    return parts
+        reads[corrections + stack.watched :, last + stack.shown :] = kicks
+    blurred = wrong[:, :n] @ np.pad(rows.measured, (0, more_states))
+    blurred[:m] += rows.noise
+    push = np.concatenate([known, blurred, np.zeros(stack.watched), kicks @ changed])
+    reads[:, n - more_states : n] += reads[:, own] * lagging
+    return Uncertain(reads=reads, push=push, sudden=sudden, changed=changed, lagging=lagging)
 
 
 def closed(sums: Sums, reads: Array, known: Array) -> Array | Failure:
@@ -170,14 +136,26 @@ def closed(sums: Sums, reads: Array, known: Array) -> Array | Failure:
     return Failure(reason=f"the uncertainty is too large for this loop: its small gain is {radius:.3g}, 1 is the limit")
 
 
-def cell_of(found: Responses, growth: float, box: Box) -> Cell:
-    """What the checker needs to know of some responses, in units of the box."""
+def cell_of(found: Responses, middle: tuple[Array, Array], growth: float, box: Box, rows: Sequence[int]) -> Cell:
+    """What the checker needs to know of some responses, in units of the box.
+
+    Args:
+        found: The responses.
+        middle: Middles of J and B.
+        growth: Weight of a period in the transient.
+        box: The box.
+        rows: Those of the inputs.
+    """
     stack = found.stack
-    own = box.half_widths[: stack.watched]
-    unit = np.concatenate([box.half_widths, box.network_bound, own, np.tile(box.input_bound, stack.pending)])
+    own = box.half_widths[: stack.watched], np.repeat(box.half_widths[list(rows)], stack.leads // len(rows))
+    plant = box.half_widths, box.half_widths[list(stack.lags)]
+    unit = np.concatenate([*plant, box.network_bound, *own, np.tile(box.input_bound, stack.pending)])
     columns = found.basis.columns / unit[:, None]
     columns = columns / np.repeat(_sizes(columns, found.basis.blocks), found.basis.blocks)
-    return Cell(columns=columns, blocks=found.basis.blocks, groups=found.groups, growth=growth)
+    force, drive = middle
+    return Cell(
+        force=force, drive=drive, columns=columns, blocks=found.basis.blocks, groups=found.groups, growth=growth
+    )
 
 
 def _sizes(columns: Array, blocks: tuple[int, ...]) -> Array:

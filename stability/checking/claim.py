@@ -13,21 +13,25 @@ from .parsing import index, number, numbers
 
 @dataclass(frozen=True)
 class Gain:
-    """Gains of one controlled row, as intervals; what bounds and starts its load network, as numbers."""
+    """Gains of one controlled row and times of its leads, as intervals; bound and start of its network, as numbers."""
 
     beta: Interval
     epsilon: Interval
     delta: Interval
     sigma: Interval
     gamma: Interval
+    lead: Interval
+    smooth: Interval
     capacity: Fraction
     preload: Fraction
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What a file says of the loop for a part of the inertias' ranges: coordinates, groups of periods, weight."""
+    """What a file says of the loop for a part of the ranges: middles of J and B, coordinates, groups, weight."""
 
+    force: list[list[Fraction]]
+    drive: list[list[Fraction]]
     columns: list[list[Fraction]]
     blocks: list[int]
     groups: list[int]
@@ -53,8 +57,6 @@ class Claim:
     period: Fraction
     delay: Fraction
     gains: list[tuple[Fraction, ...]]
-    force: list[list[Fraction]]
-    drive: list[list[Fraction]]
     split: list[int]
     cells: list[Cell]
     half_widths: list[Fraction]
@@ -73,6 +75,9 @@ class Claim:
     observer: tuple[Fraction, ...] = ()
     jitter: Fraction = Fraction(0)
     shown: list[Fraction] = field(default_factory=list)
+    leads: int = 0
+    parts: dict[str, int] = field(default_factory=dict)
+    lags: list[int] = field(default_factory=list)
 
     @property
     def measured(self) -> list[Fraction]:
@@ -88,6 +93,13 @@ class Claim:
     def networks(self) -> list[int]:
         """Indices of the rows with a load network."""
         return [i for i, gain in zip(self.controlled, self.gains, strict=True) if gain[4] > 0]
+
+    def places_of_leads(self, row: int) -> list[int]:
+        """Which of all sections of lead act on the error of a row; those of an input stand together."""
+        if row not in self.input_map:
+            return []
+        first = self.leads * self.input_map.index(row)
+        return list(range(first, first + self.leads))
 
     @property
     def whole(self) -> int:
@@ -105,8 +117,11 @@ class Claim:
         return self.whole + (self.share > 0 or self.jitter > 0)
 
 
-def cell_of(entry: dict[str, Any]) -> Cell:
-    """One cell of a certificate; how large it must be is decided where the loop is built."""
+def cell_of(entry: dict[str, Any], middle: dict[str, Any], n: int, m: int) -> Cell:
+    """One cell of a certificate of n rows and m inputs; how large it must be is decided where the loop is built.
+
+    The middles of J and B are in `middle`, an entry that all cells may share.
+    """
     columns = entry["columns"]
     need(isinstance(columns, list) and 1 <= len(columns) <= MAX_ORDER, f"coordinates are of 1 to {MAX_ORDER} states")
     blocks = [index(v, MAX_BLOCK + 1, "a block") for v in entry["blocks"]]
@@ -115,4 +130,14 @@ def cell_of(entry: dict[str, Any]) -> Cell:
     need(1 <= len(groups) <= MAX_GROUPS and min(groups) >= 1, f"1 to {MAX_GROUPS} groups of periods are summed")
     growth = number(entry["growth"], "growth")
     need(growth >= 1, "the weight of a period is 1 or more")
-    return Cell([numbers(row, len(columns), "coordinates") for row in columns], blocks, groups, growth)
+    force, drive = (
+        [numbers(row, size, key) for row in listed_of(middle[key], n, key)]
+        for key, size in (("force", n), ("drive", m))
+    )
+    return Cell(force, drive, [numbers(row, len(columns), "coordinates") for row in columns], blocks, groups, growth)
+
+
+def listed_of(value: Any, count: int, what: str) -> list[Any]:
+    """A list of a given length."""
+    need(isinstance(value, list) and len(value) == count, f"{what} must have {count} rows")
+    return value

@@ -62,6 +62,10 @@ class Table:
         """A number for an operation; the same for the same operator on the same arguments."""
         return self.keys.setdefault(operation, len(self.keys))
 
+    def copy(self) -> Table:
+        """A table of its own with the same symbols."""
+        return Table(dict(self.ranges), dict(self.definitions), dict(self.names), dict(self.keys), self.undecided)
+
     def over(self, form: Form) -> Interval:
         """Range of a form."""
         return over(form, self.ranges)

@@ -41,18 +41,25 @@ def _golden_one(vector: dict[str, Any], claim: Claim) -> list[tuple[float, Any]]
     known = [name for name in claim.feedforward if name not in claim.nominal]
     foreseen = numbers(vector.get("load", []), len(known), "golden")
     named |= {f"nominal.{name}": float(value) for name, value in zip(known, foreseen, strict=True)}
+    remembered = [float(v) for v in numbers(vector.get("lead", []), claim.leads * len(claim.inputs), "golden")]
+    period, led = float(claim.period), list(remembered)
     virtual: dict[int, float] = {}
     following, errors = [], []
     for j, i in enumerate(claim.controlled):
         target = claim.rows[i]["target"]
         goal = r[0] if target == "reference" else 0.0 if target == "zero" else virtual[target]
-        beta, epsilon, delta, sigma, *_ = (float(g) for g in claim.gains[j])
+        beta, epsilon, delta, sigma, *_, lead, smooth = (float(g) for g in claim.gains[j])
         error, program = x[i] - goal, claim.law[j]
         term = walk(program, named.__getitem__, float, float_apply)[program["outputs"][0]]
-        virtual[i] = -(beta + epsilon * theta[j]) * error / 2 + term - phi[j]
+        acting = error
+        for place in claim.places_of_leads(i):
+            w, every = remembered[place], smooth + period
+            led[place] = (smooth * w + period * acting) / every
+            acting = ((lead + period) * acting + (smooth - lead) * w) / every
+        virtual[i] = -(beta + epsilon * theta[j]) * acting / 2 + term - phi[j]
         errors.append(error)
         step = epsilon * delta * error * error / 2 - delta * sigma * theta[j]
-        following.append(theta[j] + float(claim.period) * step)
+        following.append(theta[j] + period * step)
     asked = [virtual[row] for row in claim.input_map]
     norm, limit = math.hypot(*asked), float(claim.limits[0]["value"])
     wanted = [value * (limit / max(norm, limit)) for value in asked]
@@ -60,11 +67,12 @@ def _golden_one(vector: dict[str, Any], claim: Claim) -> list[tuple[float, Any]]
     for j, i in enumerate(claim.controlled):
         gamma, capacity, own = float(claim.gains[j][4]), float(claim.gains[j][5]), _input_of(claim, i)
         held = abs(asked[own]) > abs(wanted[own]) and -errors[j] * asked[own] > 0
-        step = 0.0 if held else float(claim.period) * gamma * errors[j]
+        step = 0.0 if held else period * gamma * errors[j]
         learned.append(min(max(phi[j] + step, -capacity), capacity))
     pairs = list(zip(wanted, numbers(vector["u"], len(wanted), "golden"), strict=True))
     pairs += zip(following, numbers(vector["theta_next"], k, "golden"), strict=True)
     pairs += zip(learned, numbers(vector["phi_next"], k, "golden"), strict=True)
+    pairs += zip(led, numbers(vector.get("lead_next", []), len(led), "golden"), strict=True)
     return pairs
 
 

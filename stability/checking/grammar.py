@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .limits import MAX_CELLS, MAX_COEFFICIENTS, MAX_GROUPS, MAX_MEMBERS, MAX_OPERATIONS, MAX_ORDER, MAX_ROWS
+from .limits import MAX_CELLS, MAX_COEFFICIENTS, MAX_GROUPS, MAX_LEADS, MAX_MEMBERS, MAX_OPERATIONS, MAX_ORDER, MAX_ROWS
 from .shape import (
     entry_of,
     flag,
@@ -107,16 +107,19 @@ STUDY = entry_of(
 PROGRAM = entry_of({"inputs": listed(text, 0, 200), "operations": listed(operation, 1, MAX_OPERATIONS),
                     "outputs": listed(whole, 1, 64)})  # fmt: skip
 EXACT = listed(ratio, 1, MAX_ROWS)
+MIDDLE = dict.fromkeys(("force", "drive"), listed(EXACT, 1, MAX_ROWS))
 CERTIFICATE = entry_of(
     {"kind": text, "half_widths": EXACT, "input_bound": EXACT,
      "networks": listed(entry_of(dict.fromkeys(("row", "low", "high", "middle", "bound"), ratio) | {"row": name}),
                         0, MAX_ROWS),
-     "force": listed(EXACT, 1, MAX_ROWS), "drive": listed(EXACT, 1, MAX_ROWS), "split": listed(whole, 1, MAX_ROWS),
+     "split": listed(whole, 1, MAX_ROWS),
      "cells": listed(entry_of({"columns": listed(listed(ratio, 1, MAX_ORDER), 1, MAX_ORDER),
                                "blocks": listed(whole, 1, MAX_ORDER), "groups": listed(whole, 1, MAX_GROUPS),
-                               "growth": ratio}), 1, MAX_CELLS),
+                               "growth": ratio}, MIDDLE), 1, MAX_CELLS),
      "envelope": entry_of({"rate": ratio, "ultimate": EXACT})},
-    dict.fromkeys(("guarantee", "observed"), listed(ratio, 3, 3)),
+    dict.fromkeys(("guarantee", "observed"), listed(ratio, 3, 3)) | MIDDLE | {
+        "parts": named(whole, MAX_ROWS), "lags": listed(name, 1, MAX_ROWS),
+    },
 )  # fmt: skip
 MEMBER = entry_of(
     {
@@ -128,7 +131,7 @@ MEMBER = entry_of(
             "limits": listed(entry_of({"name": name, "signals": listed(name, 1, MAX_ROWS)}), 1, 16),
             "first": some("position", "speed"),
             "outputs": named(entry_of({"unit": unit, "program": PROGRAM}), 8),
-        }),
+        }, {"leads": whole}),
         "nominal": named(plain_number),
         "gains": listed(entry_of({"name": name, "value": plain_number, "unit": text, "min": plain_number,
                                   "max": plain_number, "meaning": text}), 1, 64),
@@ -144,7 +147,8 @@ MEMBER = entry_of(
         "certificate": CERTIFICATE,
         "golden": listed(entry_of(
             dict.fromkeys(("x", "r", "theta", "phi", "u", "theta_next", "phi_next"), listed(plain_number, 1, MAX_ROWS)),
-            {"load": listed(plain_number, 1, 1)}), 20, 100),
+            {"load": listed(plain_number, 1, 1),
+             **dict.fromkeys(("lead", "lead_next"), listed(plain_number, 1, MAX_LEADS * MAX_ROWS))}), 20, 100),
     },
     {"observer": entry_of({"first": plain_number, "second": plain_number})},
 )  # fmt: skip

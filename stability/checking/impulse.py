@@ -7,12 +7,13 @@ smaller box, less of what acts, a faster decay.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise, product
 
 from .arithmetic import WORK, Interval, down, root, up
 from .claim import Cell, Claim
-from .limits import FIXED, NotProvedError
+from .limits import FIXED, ROUNDING, NotProvedError
 from .loop import Loop
 from .matrices import Matrix, Whole, dot
 from .responses import PARTS, Responses
@@ -23,7 +24,7 @@ ROOM = Fraction(1, 1 << 30)
 
 
 class Bounded:
-    """One cell: what y = (z, s, v, c, an observer's) reaches, and how fast what a start makes of it shrinks."""
+    """One cell: what y = (z, s, v, c, w, an observer's) reaches, and how fast what a start makes of it shrinks."""
 
     def __init__(self, turn: Turn, cell: Cell) -> None:
         self.turn, self.cell = turn, cell
@@ -37,39 +38,60 @@ class Bounded:
         forced = [v + dot(row, [*pulses, *turn.noise]) for v, row in zip(forced, plain[1], strict=True)]
         first = [*turn.started()[0], Fraction(1)]
         begun = [[dot(row, first) for row in sums[2]] for sums in (plain, weighted)]
-        self.forced = bounded(self.gain[0], forced)
-        self.whole = bounded(self.gain[0], [a + b for a, b in zip(forced, begun[0], strict=True)])
-        self.amplitude = bounded(self.gain[1], begun[1])
-        acted = [dot(row, self.whole) + push for row, push in zip(self.reads[:n], turn.push, strict=True)]
+        whole = bounded(self.gain[0], [a + b for a, b in zip(forced, begun[0], strict=True)])
+        acted = [dot(row, whole) + push for row, push in zip(self.reads[:n], turn.push, strict=True)]
         moved = [dot(row[n:], turn.moving) for row in turn.sources[:n]]
-        self.rates = [up(s + r + p) for s, r, p in zip(self.whole[n : 2 * n], acted, moved, strict=True)]
+        rates = [up(s + r + p) for s, r, p in zip(whole[n : 2 * n], acted, moved, strict=True)]
         if turn.jitter:
-            changes = [v + w for v, w in zip(self.whole[-m:], turn.jitter.changed, strict=True)]
-            self.rates = [up(v + dot(row, changes)) for v, row in zip(self.rates, turn.jitter.sudden, strict=True)]
+            changes = [v + w for v, w in zip(whole[-m:], turn.jitter.changed, strict=True)]
+            rates = [up(v + dot(row, changes)) for v, row in zip(rates, turn.jitter.sudden, strict=True)]
+        self.rates = self._joined(rates)[: len(turn.claim.rows)]
+        self.forced = self._read(bounded(self.gain[0], forced))
+        self.whole, self.amplitude = self._read(whole), self._read(bounded(self.gain[1], begun[1]))
+        n = len(turn.claim.rows)
         self.inputs = [v + late for v, late in zip(self.whole[2 * n : 2 * n + m], turn.late, strict=True)]
-        self.missed = self.whole[2 * n + m : 2 * n + m + turn.q + len(turn.shown)]
+        after = 2 * n + m + turn.q
+        self.missed = self.whole[2 * n + m : after]
+        after += turn.filters
+        self.missed += self.whole[after : after + len(turn.shown)]
+
+    def _joined(self, reached: list[Fraction]) -> list[Fraction]:
+        """Bounds with z as it is, of bounds on y or on rates."""
+        found = list(reached)
+        for place, i, share in self.turn.followed:
+            found[i] = up(found[i] + share * reached[place])
+        return found
+
+    def _read(self, reached: list[Fraction]) -> list[Fraction]:
+        """Bounds on y with z as it is, and without what only lags have."""
+        n, whole, found = len(self.turn.claim.rows), self.turn.n, self._joined(reached)
+        return [*found[:n], *found[whole : whole + n], *found[2 * whole :]]
 
     def _reads(self) -> tuple[Matrix, list[Fraction]]:
-        """S: |ρ| and the pulses on inputs, networks and an observer over y; and what of the pulses is known."""
+        """S: |ρ| and the pulses on inputs, networks, leads and an observer over y; and what of them is known."""
         turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
         rest = [Fraction(0)] * (len(turn.shown) + turn.turns)
         kicks, changed = (turn.jitter.kicks, turn.jitter.changed) if turn.jitter else ([], [])
-        nothing = [Fraction(0)] * q + rest
+        nothing = [Fraction(0)] * (q + turn.filters) + rest
         reads = []
         for i in range(n):
-            more = 1 + turn.change[i]
+            more = turn.more[i]
             row = [more * v for v in turn.a_spread[i]]
             row += [turn.change[i] * int(i == j) for j in range(n)]
             reads.append([*row, *(more * v for v in turn.b_spread[i]), *nothing])
-        known = list(turn.blur) + [Fraction(0)] * (q + turn.w) + [dot(row, changed) for row in kicks]
+        known = list(turn.blur) + [Fraction(0)] * (q + turn.filters + turn.w) + [dot(row, changed) for row in kicks]
         errors = [size / r for size, r in zip(turn.claim.measured, turn.claim.half_widths, strict=True)]
-        for k, row in enumerate([*turn.act_spread, *turn.learn_spread]):
+        errors += [Fraction(0)] * len(turn.claim.lags)
+        for k, row in enumerate([*turn.act_spread, *turn.learn_spread, *turn.smooth_spread]):
             reads.append([*row[:n], *[Fraction(0)] * (n + m), *row[n:], *rest])
             known[k] += dot(row[:n], errors)
         ahead = [Fraction(0)] * (len(reads[0]) - turn.turns)
         for gain in turn.blind:
             reads.append([*ahead[:-1], gain, *[Fraction(0)] * turn.turns])
         reads += [[*ahead, *row] for row in kicks]
+        for row in reads:
+            for place, i, share in turn.followed:
+                row[place] += share * row[i]
         return [[up(v) for v in row] for row in reads], [up(v) for v in known]
 
     def _gain(self, sums: list[Matrix]) -> Matrix:
@@ -117,7 +139,7 @@ def bounded(gain: Matrix, known: list[Fraction]) -> list[Fraction]:
 
 
 class Impulse:
-    """Verdicts on a member: each cell of the inertias' ranges by itself."""
+    """Verdicts on a member: each cell of the ranges by itself."""
 
     def __init__(self, claim: Claim, loop: Loop) -> None:
         self.claim, self.loop = claim, loop
@@ -127,10 +149,24 @@ class Impulse:
             WORK.one(
                 (rows * substeps * order * (len(claim.rows) + 1) + 8 * max(cell.groups) * order + 20 * order**3) // COST
             )
-        cuts = [parts_of(mass, count) for mass, count in zip(loop.mass, claim.split, strict=True)]
-        parts = zip(claim.cells, product(*cuts), strict=True)
-        self.cells = [Bounded(Turn(claim, loop, list(masses)), cell) for cell, masses in parts]
+        parts = [
+            (part, own, list(masses))
+            for part, own in self._pieces()
+            for masses in product(*map(parts_of, own.mass, claim.split))
+        ]
+        cells = zip(claim.cells, parts, strict=True)
+        self.cells = [Bounded(Turn(part, own, cell, masses), cell) for cell, (part, own, masses) in cells]
         self.later: dict[int, list[Fraction]] = {}
+
+    def _pieces(self) -> list[tuple[Claim, Loop]]:
+        """The statement with every combination of parts of the constants that are cut, the last one running fastest."""
+        claim = self.claim
+        if not claim.parts:
+            return [(claim, self.loop)]
+        cuts = [parts_of(claim.parameters[name], count) for name, count in claim.parts.items()]
+        chosen = [dict(zip(claim.parts, ranges, strict=True)) for ranges in product(*cuts)]
+        pieces = [replace(claim, parameters={**claim.parameters, **part}) for part in chosen]
+        return [(piece, Loop(piece, ROUNDING)) for piece in pieces]
 
     def contraction(self) -> Fraction:
         """How far the slowest cell is from not contracting, with the weight of its transient."""
@@ -203,10 +239,13 @@ class Impulse:
 
 
 def parts_of(whole: Interval, count: int) -> list[Interval]:
-    """A positive range in parts of about equal ratios that cover it."""
+    """A range in parts that cover it: of about equal ratios where it is positive, of equal widths elsewhere."""
     low, high = whole
-    ratio = float(high / low)
-    cuts = [down(low * Fraction(ratio ** (k / count))) for k in range(1, count)]
+    if low > 0:
+        ratio = float(high / low)
+        cuts = [down(low * Fraction(ratio ** (k / count))) for k in range(1, count)]
+    else:
+        cuts = [down(low + (high - low) * k / count) for k in range(1, count)]
     return list(pairwise([low, *(min(max(cut, low), high) for cut in cuts), high]))
 
 

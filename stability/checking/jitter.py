@@ -29,7 +29,7 @@ class Jitter:
         forward = exponential_of([*block, *[[Fraction(0)] * (2 * n)] * n]).part(slice(0, n), slice(None))
         grown = [[up(Fraction(v, 1 << FIXED)) for v in row] for row in forward.sizes()]
         self.grown, area = [row[:n] for row in grown], [row[n:] for row in grown]
-        more = [1 + change for change in turn.change]
+        more = turn.more
         worse = [[turn.change[i] * size[i][j] + more[i] * turn.a_spread[i][j] for j in range(n)] for i in range(n)]
         driven = [[more[i] * (abs(v) + w) for v, w in zip(turn.b[i], turn.b_spread[i], strict=True)] for i in range(n)]
         grows = inverse_of(_combined(identity(n), _times(area, worse), -1))

@@ -23,6 +23,8 @@ MAX_BYTES, MAX_DIGITS, MAX_EXPONENT, MAX_OPERATIONS, MAX_ROWS, MAX_COEFFICIENTS 
 MAX_CELLS, MAX_ORDER, MAX_BLOCK, MAX_GROUPS = 64, 24, 4, 400
 #: Largest number of periods in a group, and of periods of delay.
 MAX_GROUP, MAX_DELAY = 2_000, 8
+#: Sections of lead of an input.
+MAX_LEADS = 4
 #: A parameter that may change in a run: faults take effectiveness.
 VARYING = "effectiveness"
 #: A range of an assumption is that of the study to this share: it is written rounded outwards.

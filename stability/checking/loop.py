@@ -10,20 +10,29 @@ from fractions import Fraction
 from typing import Any
 
 from .arithmetic import ONE, ZERO, Interval, add, down, inverse, magnitude, mul, neg, symmetric, up
+from .balance import SETTLE, Balance, inside, widened
 from .claim import Claim, Gain
 from .forms import Form, Node, Table, derivative, linear, over, plus, times
 from .limits import VARYING, NotProvedError, need
-from .parsing import reads
+from .parsing import only, reads
 
 #: Derivatives of the reference that have a bounded rate.
 SIGNALS = ("r0", "r1", "r2")
 
 
-def placed(target: Any) -> dict[str, Fraction]:
+def placed(row: dict[str, Any]) -> dict[str, Fraction]:
     """Coefficients of the signals whose sum is the target of a row that follows no other."""
+    target = row["target"]
     if isinstance(target, dict):
         return target
+    if target == "balance":
+        return {f"@{row['state']}": Fraction(1)}
     return {"r0": Fraction(1)} if target == "reference" else {}
+
+
+def rate_of(row: dict[str, Any]) -> Form:
+    """The rate of the target of a row that tracks nothing but the reference."""
+    return {f"r{int(s[1]) + 1}": (v, v) for s, v in placed(row).items()}
 
 
 def joined(program: dict[str, Any], names: set[str]) -> dict[str, Any]:
@@ -52,7 +61,7 @@ class Loop:
         self.claim, self.table = claim, Table()
         self.gain: dict[int, Gain] = {}
         for i, values in zip(claim.controlled, claim.gains, strict=True):
-            wide = [(v * (1 - inflate), v * (1 + inflate)) for v in values[:5]]
+            wide = [(v * (1 - inflate), v * (1 + inflate)) for v in (*values[:5], *values[7:])]
             self.gain[i] = Gain(*wide, capacity=values[5], preload=values[6])
         self.term = dict(zip(claim.controlled, claim.law, strict=True))
         self.half: dict[int, Interval] = {}
@@ -75,16 +84,17 @@ class Loop:
             self._name(name, plus({f"w:{name}": ONE}, self.nodes[name].form))
         self.rated, self.quotients = dict(claim.feedforward), set()
         for row in claim.rows:
-            for name in placed(row["target"]):
+            for name in placed(row):
                 if "/" in name and name not in self.quotients:
                     self._quotient(name, *name.split("/", 1))
         for k, bounds in enumerate(claim.reference):
             table.ranges[f"r{k}"] = bounds
             self._name(f"r{k}", {f"r{k}": ONE})
-        for i, bounds in zip(claim.networks, claim.demand, strict=True):
-            table.ranges[f"p{i}"] = bounds
         for i, radius in enumerate(claim.half_widths):
             table.ranges[f"Q{i}"] = symmetric(radius)
+        self.balances = {i: self._balanced(i) for i, row in enumerate(claim.rows) if row["target"] == "balance"}
+        for i, bounds in zip(claim.networks, claim.demand, strict=True):
+            table.ranges[f"p{i}"] = bounds
         for k, error in enumerate(claim.input_bound):
             table.ranges[f"e{k}"] = symmetric(error)
         for i, row in enumerate(claim.rows):
@@ -93,6 +103,41 @@ class Loop:
             self._control(i)
         for k, (name, row) in enumerate(zip(claim.inputs, claim.input_map, strict=True)):
             self._name(name, plus(self.kappa(row), {f"e{k}": ONE}))
+
+    def _balanced(self, i: int) -> int:
+        """What row i carries so that the only other row that reads it moves as is asked for; returns that row."""
+        claim, n, state = self.claim, len(self.claim.rows), self.claim.rows[i]["state"]
+        outputs = claim.plant["outputs"]
+        reading = [j for j in range(n) if j != i and state in reads(claim.plant, [outputs[n + j]])]
+        need(len(reading) == 1, f"a state balances the only other row that reads it: {len(reading)} read {state}")
+        (k,) = reading
+        row, own, span = claim.rows[k], f"w:@{state}", ZERO
+        need(row["target"] in ("reference", "zero"), "a balance is of a row that tracks the reference")
+        program = only(joined(claim.plant, self.quotients), [outputs[k], outputs[n + k]])
+        for _ in range(SETTLE):
+            table = self.table.copy()
+            table.ranges[own] = span
+            nodes = dict(self.nodes)
+            for j, form in ((i, {own: ONE}), (k, {s: (v, v) for s, v in placed(row).items()})):
+                whole = plus({f"Q{j}": ONE}, form)
+                nodes[claim.rows[j]["state"]] = Node(
+                    table.key("input", claim.rows[j]["state"]), whole, table.over(whole)
+                )
+            need(reads(program) <= set(nodes), "a row in balance reads a state that is not in it")
+            mass, force = linear(program, nodes, table)
+            found = Balance(force.form, own, mass.range, rate_of(row), self._rates(), table)
+            needed = found.range(table.ranges)
+            if inside(needed, span):
+                self.table.ranges[own] = span
+                self.rated[f"@{state}"] = span, found.rate(self._rates())
+                return k
+            span = widened(needed)
+        raise NotProvedError(f"what {state} carries does not settle")
+
+    def _rates(self) -> dict[str, Interval]:
+        """Rates of the signals whose rate is bounded."""
+        changes = {f"r{k}": self.claim.reference[k + 1] for k in range(3)}
+        return changes | {f"w:{name}": change for name, (_, change) in self.rated.items()}
 
     def _quotient(self, name: str, load: str, parameter: str) -> None:
         """A disturbance of bounded rate over a constant, which is another one."""
@@ -124,7 +169,8 @@ class Loop:
         target = self.claim.rows[i]["target"]
         if isinstance(target, int):
             return self.kappa(target)
-        return plus({}, *(times(self._signal(name), (share, share)) for name, share in placed(target).items()))
+        shares = placed(self.claim.rows[i]).items()
+        return plus({}, *(times(self._signal(name), (share, share)) for name, share in shares))
 
     def _signal(self, name: str) -> Form:
         """A derivative of the reference, one; or a disturbance, its middle where its rate has no bound."""
@@ -213,7 +259,7 @@ class Loop:
         rates: list[Form] = []
         for i, row in enumerate(claim.rows):
             target = row["target"]
-            own = {} if isinstance(target, int) else placed(target)
+            own = {} if isinstance(target, int) else placed(row)
             known = {k: moving[k] if k in SIGNALS else {"": self.rated.get(k, (ZERO, ZERO))[1]} for k in own}
             parts = [times(known[k], (share, share)) for k, share in own.items()]
             rates.append(self.virtual[target] if isinstance(target, int) else plus({}, *parts))
@@ -221,9 +267,23 @@ class Loop:
             if i in self.gain:
                 self.virtual[i] = table.expand(derivative(self.term[i], self._ranges(), moving))
         places = {i: self._driven(i) for i in claim.networks}
-        left = {place: self._demanded(i, place, raw[place], rates[place]) for i, place in places.items()}
+        held = [*places.values(), *self.balances.values()]
+        need(len(set(held)) == len(held), "a row is held by one load network or one mode")
+        carried = {k: self._carried(i, raw[k], self.mass[k]) for i, k in self.balances.items()}
+        left = {place: self._demanded(i, place, raw[place], rates[place]) for i, place in places.items()} | carried
         for i, form in enumerate(self.closed):
             self.disturbance.append(left[i] if i in left else magnitude(self._left(form)))
+
+    def _carried(self, i: int, raw: Form, mass: Interval) -> Fraction:
+        """What is left of a row that the state of row i balances; what that carries at rest."""
+        own, row = f"w:@{self.claim.rows[i]['state']}", self.claim.rows[self.balances[i]]
+        found = Balance(raw, own, mass, rate_of(row), self._rates(), self.table)
+        settled = inside(found.range(self.table.ranges), self.table.ranges[own])
+        need(
+            settled and inside(found.rate(self._rates()), self.rated[own[2:]][1]), "what a mode carries does not settle"
+        )
+        self.resting[own] = found.range({**self.table.ranges, **self.resting})
+        return magnitude(self._left(found.left))
 
     def _left(self, form: Form, known: dict[str, Interval] | None = None) -> Interval:
         """Range of what is neither a deviation nor an input, where some ranges may be known better."""
@@ -238,8 +298,7 @@ class Loop:
         """
         claim, table = self.claim, self.table
         place = claim.networks.index(i)
-        changes = {f"r{k}": claim.reference[k + 1] for k in range(3)}
-        changes |= {f"w:{name}": change for name, (_, change) in self.rated.items()}
+        changes = self._rates()
         centres = {s: down((c[0] + c[1]) / 2) for s, c in rate.items() if s in changes}
         shift = {s: (c, c) for s, c in centres.items()}
         met = plus({s: c for s, c in raw.items() if s in changes}, times(shift, neg(self.mass[row])))

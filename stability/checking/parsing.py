@@ -150,3 +150,18 @@ def reads(program: dict[str, Any], outputs: Iterable[int] | None = None) -> set[
             elif operator != "const":
                 needed.update(arguments)
     return names
+
+
+def only(program: dict[str, Any], outputs: list[int]) -> dict[str, Any]:
+    """The program of some entries alone."""
+    needed = set(outputs)
+    for k in range(len(program["operations"]) - 1, -1, -1):
+        operator, *arguments = program["operations"][k]
+        if k in needed and operator not in ("input", "const"):
+            needed.update(arguments)
+    place = {old: new for new, old in enumerate(sorted(needed))}
+    made = []
+    for old in sorted(needed):
+        operator, *arguments = program["operations"][old]
+        made.append([operator, *(arguments if operator in ("input", "const") else (place[k] for k in arguments))])
+    return {"operations": made, "outputs": [place[k] for k in outputs]}

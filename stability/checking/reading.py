@@ -12,7 +12,19 @@ from typing import Any
 
 from .arithmetic import Interval, magnitude
 from .claim import Claim, cell_of
-from .limits import CARRIED, MAX_CELLS, MAX_DELAY, MAX_ROWS, NAME, REQUIRED, ROUND, UNIT_TEXT, UnreadableError, need
+from .limits import (
+    CARRIED,
+    MAX_CELLS,
+    MAX_DELAY,
+    MAX_LEADS,
+    MAX_ROWS,
+    NAME,
+    REQUIRED,
+    ROUND,
+    UNIT_TEXT,
+    UnreadableError,
+    need,
+)
 from .parsing import index, number, numbers, reads, valid_program
 from .reference import reference_bounds
 from .statement import stroke_of
@@ -48,11 +60,24 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     transient = number(study["validation"]["transient_s"], "transient_s")
     need(rate > 0 and transient >= 0, "the control rate must be positive, the transient not negative")
     split = [index(v, MAX_CELLS + 1, "split") for v in certificate["split"]]
-    cells = [cell_of(cell) for cell in certificate["cells"]]
-    covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod(split)
-    need(covered, "the cells do not cover the inertias")
-    gains = gains_of(entry["gains"], controlled, study, entry["name"])
+    parts = {name: index(v, MAX_CELLS + 1, "parts") for name, v in certificate.get("parts", {}).items()}
+    cut = set(parts) <= set(assumed["parameter"]) - {"effectiveness"} and min(parts.values(), default=2) > 1
+    need(cut, "only ranges of constants are cut into parts, and into two or more")
+    cells = [cell_of(cell, cell if parts else certificate, n, m) for cell in certificate["cells"]]
+    alone = all(("force" in c, "drive" in c) == (bool(parts), bool(parts)) for c in certificate["cells"])
+    need(
+        alone and ("force" in certificate, "drive" in certificate) == (not parts, not parts),
+        "the middles of a loop are stated once: of each cell where constants are cut, else of all",
+    )
+    covered = len(split) == n and min(split) >= 1 and len(cells) == math.prod([*split, *parts.values()])
+    need(covered, "the cells do not cover the inertias and the constants that are cut")
+    leads = index(model["leads"], MAX_LEADS + 1, "a number of leads") if "leads" in model else 0
+    need(leads > 0 or "leads" not in model, "a model without leads does not name them")
+    gains = gains_of(entry["gains"], controlled, input_map if leads else [], study, entry["name"])
     own = [states[i] for i, gain in zip(controlled, gains, strict=True) if gain[4] > 0]
+    lags = [states.index(name) if name in states else -1 for name in certificate.get("lags", [])]
+    following = all(i >= 0 and isinstance(rows[i]["target"], int) and i not in controlled for i in lags)
+    need(following and len(set(lags)) == len(lags), "a lag is of a row without law that follows another")
     networks = certificate["networks"]
     need([given["row"] for given in networks] == own, "the networks are not those of the gains")
     delay = number(controller["delay_s"], "delay_s")
@@ -70,9 +95,7 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
         reference=reference_bounds(entry["reference"]),
         noise=[magnitude(assumed["noise"][s]) for s in states],
         initial=[magnitude(assumed["initial"][s]) for s in states],
-        period=1 / rate, delay=delay, gains=gains, split=split, cells=cells,
-        force=[numbers(row, n, "force") for row in listed_of(certificate["force"], n, "force")],
-        drive=[numbers(row, m, "drive") for row in listed_of(certificate["drive"], n, "drive")],
+        period=1 / rate, delay=delay, gains=gains, split=split, parts=parts, cells=cells,
         half_widths=numbers(certificate["half_widths"], n, "half_widths"),
         input_bound=numbers(certificate["input_bound"], m, "input_bound"),
         demand=[(number(given["low"], "low"), number(given["high"], "high")) for given in networks],
@@ -83,7 +106,8 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
         transient=transient,
         feedforward={name: (v, assumed["feedforward_rate"][name]) for name, v in assumed["feedforward"].items()},
         first=model["first"], rest=rest_of(entry["reference"]["segments"], study["reference"]["dwell_s"]),
-        jitter=jitter, observer=watched, shown=numbers(certificate["observed"], 3, "observed") if watched else [],
+        jitter=jitter, leads=leads, lags=lags, observer=watched,
+        shown=numbers(certificate["observed"], 3, "observed") if watched else [],
     )  # fmt: skip
 
 
@@ -118,12 +142,6 @@ def rest_of(segments: list[dict[str, Any]], pause: Any) -> tuple[Fraction, Fract
     return number(segments[0]["coefficients"][0], "a coefficient"), knots[-1] - knots[0]
 
 
-def listed_of(value: Any, count: int, what: str) -> list[Any]:
-    """A list of a given length."""
-    need(isinstance(value, list) and len(value) == count, f"{what} must have {count} rows")
-    return value
-
-
 def rows_of(model: dict[str, Any]) -> tuple[list[dict[str, Any]], list[int], list[int]]:
     """The subsystems, indices of those with gains, and the row of each input."""
     rows = model["rows"]
@@ -134,6 +152,8 @@ def rows_of(model: dict[str, Any]) -> tuple[list[dict[str, Any]], list[int], lis
         if isinstance(target, dict):
             need(row["controlled"] is False, "a row under the law tracks the reference, zero, or a row")
             row["target"] = {name: number(share, "a row's target") for name, share in target.items()}
+        elif target == "balance":
+            need(row["controlled"] is False, "a row under the law tracks the reference, zero, or a row")
         elif target not in ("reference", "zero"):
             row["target"] = index(target, i, "a row's target")
             need(rows[row["target"]]["controlled"] is True, "a row's target must be a controlled row")
@@ -187,16 +207,18 @@ def check_names(
 
 
 def gains_of(
-    entries: list[dict[str, Any]], controlled: list[int], study: dict[str, Any], name: str
+    entries: list[dict[str, Any]], controlled: list[int], led: list[int], study: dict[str, Any], name: str
 ) -> list[tuple[Fraction, ...]]:
-    """β, ε, δ, σ, γ, Φ, φ̂(0) of each controlled row, inside the ranges of the file and of the study."""
+    """β, ε, δ, σ, γ, Φ, φ̂(0), a and f of each controlled row, inside the ranges of the file and of the study."""
     kinds = ("beta", "epsilon", "delta", "sigma", "gamma", "phi", "preload")
     given = {entry["name"]: number(entry["value"], entry["name"]) for entry in entries}
     names = [f"{kind}_{k + 1}" for k in range(len(controlled)) for kind in kinds]
+    names += [f"{kind}_{k + 1}" for k, row in enumerate(controlled) if row in led for kind in ("lead", "smooth")]
     need(set(given) == set(names) and len(entries) == len(names), "the gains do not fit the subsystems")
-    gains = [tuple(given[f"{kind}_{k + 1}"] for kind in kinds) for k in range(len(controlled))]
-    good = all(b > 0 and e >= 0 and d > 0 and s > 0 and g >= 0 and phi >= abs(p) * (g > 0) >= 0
-               for b, e, d, s, g, phi, p in gains)  # fmt: skip
+    gains = [tuple(given.get(f"{kind}_{k + 1}", Fraction(0)) for kind in (*kinds, "lead", "smooth"))
+             for k in range(len(controlled))]  # fmt: skip
+    good = all(b > 0 and e >= 0 and d > 0 and s > 0 and g >= 0 and phi >= abs(p) * (g > 0) >= 0 <= min(times)
+               for b, e, d, s, g, phi, p, *times in gains)  # fmt: skip
     need(good, "gains must be positive, and a preload inside phi")
     ranges = study["controller"]["members"][name]
     need(set(ranges) == set(names), f"the ranges of the gains of {name} are not those of its gains")

@@ -82,7 +82,7 @@ class Responses:
         return reach, times_up(times_up(reach, missed), reach)
 
     def _instants(self) -> None:
-        """Rows of the outputs (z, s, v) at both ends of every sub-step, each once; of c, and of an observer's."""
+        """Rows of the outputs (z, s, v) at both ends of every sub-step, each once; of c, w and an observer's."""
         turn, n, m, q = self.turn, self.turn.n, self.turn.m, self.turn.q
         flow = ball([[*row] for row in turn.flow[:n]])
         direct = ball([[Fraction(0)] * n + row for row in turn.direct])
@@ -103,8 +103,9 @@ class Responses:
             self.pairs.append((ends[0], ends[1]))
         rows = [row for part in made for row in part.rows]
         self.count = len(rows)
-        networks = [[Fraction(int(c == n + j)) for c in range(turn.columns)] for j in range(q)]
-        chosen = ball([*networks, *turn.shown, *turn.turned()])
+        places = [*range(n, n + q), *range(turn.first - turn.filters, turn.first)]
+        remembered = [[Fraction(int(c == place)) for c in range(turn.columns)] for place in places]
+        chosen = ball([*remembered, *turn.shown, *turn.turned()])
         self.rows = Ball([*rows, *chosen.rows], max(chosen.error, *(part.error for part in made)))
 
     def _groups(self) -> None:

@@ -132,7 +132,7 @@ def target(value: Any, where: str) -> None:
                 name(part, where)
             plain_number(share, where)
     elif not isinstance(value, Fraction):
-        some("reference", "zero")(value, where)
+        some("reference", "zero", "balance")(value, where)
 
 
 def operation(value: Any, where: str) -> None:

@@ -19,6 +19,8 @@ MEANINGS = {
     "sigma": "leakage of the adaptation", "gamma": "gain of the load network",
     "phi": "largest estimate of the load network", "preload": "estimate of the load network at the start",
 }  # fmt: skip
+#: The same of the leads of an input.
+TIMES = {"lead": "time of each section of lead", "smooth": "time of their filters"}
 #: Key of a stroke by the unit of the first state.
 STROKE = {"m": "stroke_m", "rad": "stroke_rad", "m/s": "stroke_m_s", "rad/s": "stroke_rad_s"}
 
@@ -111,6 +113,8 @@ def _assumed(
 def _gains(entry: dict[str, Any], claim: Claim, units: dict[str, str]) -> None:
     """Units and meanings of the gains: β maps Q to what the row asks for, ε θ̂ has the unit of β."""
     order = [f"{kind}_{k + 1}" for k in range(len(claim.controlled)) for kind in MEANINGS]
+    led = [k for k, row in enumerate(claim.controlled) if claim.leads and row in claim.input_map]
+    order += [f"{kind}_{k + 1}" for k in led for kind in TIMES]
     need([gain["name"] for gain in entry["gains"]] == order, "the gains stand in another order")
     for gain in entry["gains"]:
         kind, _, place = gain["name"].partition("_")
@@ -120,12 +124,10 @@ def _gains(entry: dict[str, Any], claim: Claim, units: dict[str, str]) -> None:
         control = following[0] if following else claim.limits[0]["unit"]
         ratio = f"({control})/({units[state]})"
         unit = {"beta": ratio, "epsilon": f"sqrt({ratio}/s)/({units[state]})", "delta": "1", "sigma": "1/s",
-                "gamma": f"{ratio}/s", "phi": control, "preload": control}[kind]  # fmt: skip
+                "gamma": f"{ratio}/s", "phi": control, "preload": control}.get(kind, "s")  # fmt: skip
         need(gain["unit"] == unit, f"{gain['name']} must be in {unit}")
-        need(
-            gain["meaning"] == f"{MEANINGS[kind]} of subsystem {place} ({state})",
-            f"{gain['name']} means something else",
-        )
+        meaning = f"{ {**MEANINGS, **TIMES}[kind] } of subsystem {place} ({state})"
+        need(gain["meaning"] == meaning, f"{gain['name']} means something else")
 
 
 def _terms(claim: Claim, study: dict[str, Any]) -> None:

@@ -58,6 +58,9 @@ def different(vectors: list[dict[str, Any]], claim: Claim) -> None:
     """Refuse golden vectors that repeat each other in what the law reads, or that never move a result."""
     named = {name for term in claim.law for name in reads(term)} | {"r0"}
     kept = [k for k in range(4) if f"r{k}" in named]
-    seen = {(tuple(v["x"]), tuple(v["r"][k] for k in kept), tuple(v["theta"]), tuple(v["phi"])) for v in vectors}
+    seen = {
+        (tuple(v["x"]), tuple(v["r"][k] for k in kept), tuple(v["theta"]), tuple(v["phi"]), tuple(v.get("lead", ())))
+        for v in vectors
+    }
     need(len(seen) == len(vectors), "golden vectors must differ in what the law reads")
     need(len({tuple(v["u"]) for v in vectors}) > len(vectors) // 2, "golden vectors must move the input")

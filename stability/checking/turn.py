@@ -8,9 +8,10 @@ from __future__ import annotations
 from fractions import Fraction
 
 from .arithmetic import ZERO, Interval, add, down, mul, neg, up
-from .claim import Claim
+from .claim import Cell, Claim
 from .jitter import Jitter
-from .limits import FIXED, ROUNDING
+from .lead import sections
+from .limits import FIXED, ROUNDING, need
 from .loop import Loop
 from .matrices import Ball, Matrix, ball, dot, exponential_of, identity
 
@@ -26,24 +27,26 @@ def split_of(rows: list[list[Interval]]) -> tuple[Matrix, Matrix]:
 
 
 class Turn:
-    """The loop of constant numbers for a part of the inertias' ranges, and what it leaves out.
+    """The loop of constant numbers for a part of the ranges, and what it leaves out.
 
     Everything is in units of the box: z_i of half_widths_i, v_k of input_bound_k, φ̂ - φ* of network_bound_q, time of
-    the period. Z holds z, φ̂ - φ*, the states of an observer, and the pending inputs, newest first; columns of maps are
-    over Z, then pulses on the new inputs, on the networks and on what the observer sees, kicks of jitter to the states,
-    and measurement errors of the states.
+    the period. Z holds z, ζ of lags, φ̂ - φ*, the states of an observer, those of leads, and the pending inputs, newest
+    first; columns of maps are over Z, then pulses on the new inputs, on the networks, on the leads and on what the
+    observer sees, kicks of jitter to the states, and measurement errors of the states.
     """
 
-    def __init__(self, claim: Claim, loop: Loop, masses: list[Interval]) -> None:
+    def __init__(self, claim: Claim, loop: Loop, cell: Cell, masses: list[Interval]) -> None:
         self.claim, self.loop = claim, loop
-        self.n, self.m, self.q = len(claim.rows), len(claim.inputs), len(claim.networks)
+        self.n, self.m, self.q = len(claim.rows) + len(claim.lags), len(claim.inputs), len(claim.networks)
         self.w = 2 if claim.observer else 0
-        self.first = self.n + self.q + self.w
+        self.filters = claim.leads * self.m
+        self.first = self.n + self.q + self.w + self.filters
         self.order = self.first + self.m * claim.pending
         self.kicked, self.turns = (self.n, self.m) if claim.jitter > 0 else (0, 0)
-        self.width = self.m + self.q + self.w + self.kicked + self.n
+        self.width = self.m + self.q + self.filters + self.w + self.kicked + self.n
         self.columns = self.order + self.width
-        self._plant(masses)
+        self._plant(cell, masses)
+        self._lags()
         self._controller()
         self._observer()
         self.jitter = Jitter(self) if claim.jitter > 0 else None
@@ -51,9 +54,9 @@ class Turn:
         self._phases()
         self._sample()
 
-    def _plant(self, masses: list[Interval]) -> None:
+    def _plant(self, cell: Cell, masses: list[Interval]) -> None:
         """a, b and how far they may be from the truth; μ; known bounds on what acts."""
-        claim, loop, n, m = self.claim, self.loop, self.n, self.m
+        claim, loop, n, m = self.claim, self.loop, len(self.claim.rows), self.m
         mass = [down(2 / (1 / low + 1 / high)) for low, high in masses]
         self.change = [up(max(m0 / low - 1, 1 - m0 / high)) for m0, (low, high) in zip(mass, masses, strict=True)]
         rate = [claim.period / (m0 * r) for m0, r in zip(mass, claim.half_widths, strict=True)]
@@ -61,9 +64,9 @@ class Turn:
         def scaled(found: Interval, taken: Fraction, factor: Fraction) -> tuple[Fraction, Fraction]:
             return taken * factor, up(max(found[1] - taken, taken - found[0], Fraction(0)) * factor)
 
-        force = [[scaled(loop.entry(i, j), claim.force[i][j], rate[i] * claim.half_widths[j]) for j in range(n)]
+        force = [[scaled(loop.entry(i, j), cell.force[i][j], rate[i] * claim.half_widths[j]) for j in range(n)]
                  for i in range(n)]  # fmt: skip
-        drive = [[scaled(loop.closed[i].get(f"e{k}", ZERO), claim.drive[i][k], rate[i] * claim.input_bound[k])
+        drive = [[scaled(loop.closed[i].get(f"e{k}", ZERO), cell.drive[i][k], rate[i] * claim.input_bound[k])
                   for k in range(m)] for i in range(n)]  # fmt: skip
         (self.a, self.a_spread), (self.b, self.b_spread) = (
             ([[v[0] for v in row] for row in part], [[v[1] for v in row] for row in part]) for part in (force, drive)
@@ -77,35 +80,67 @@ class Turn:
         pairs = zip(loop.demand_rate, claim.network_bound, strict=True)
         self.moving = [up(claim.period * r / bound) for r, bound in pairs]
 
+    def _lags(self) -> None:
+        """Another state ζ' = a_ii ζ + s_i for each lag: δ s_i acts as δ ζ would, added to z_i wherever that is read."""
+        claim, n, count = self.claim, len(self.claim.rows), len(self.claim.lags)
+        none = [Fraction(0)] * count
+        self.more = [1 + v for v in self.change] + [Fraction(1)] * count
+        self.lagging = [self.change[i] for i in claim.lags]
+        for rows in (self.a, self.a_spread):
+            rows[:] = [[*row, *none] for row in rows]
+        for k, i in enumerate(claim.lags):
+            alone = all(self.loop.entry(i, j) == ZERO for j in range(n) if j != i)
+            need(alone and self.a[i][i] < 0, "a lag reads nothing but what it follows")
+            for j in range(n):
+                self.a_spread[j][n + k] += up(abs(self.a[j][i]) * self.change[i]) if j != i else 0
+            own = [*self.a[i][:n], *none]
+            own[n + k] = self.a[i][i]
+            self.a.append(own)
+            self.a_spread.append([Fraction(0)] * (n + count))
+            self.a_spread[-1][n + k] = up(abs(self.a[i][i]) * self.change[i])
+            self.b.append(list(self.b[i]))
+            self.b_spread.append([Fraction(0)] * self.m)
+        for i in claim.lags:
+            self.change[i] = Fraction(0)
+        self.change += none
+        self.push += none
+
     def _controller(self) -> None:
-        """K, C, G and A of the discrete part: middles and distances from them; how Z(0) follows from Q(0) and φ̂(0)."""
-        claim, loop, n, q = self.claim, self.loop, self.n, self.q
-        scale = [*claim.half_widths, *claim.network_bound]
+        """The discrete part over (ẑ, c, w): middles and distances from them; how Z(0) follows from Q(0) and φ̂(0)."""
+        claim, loop, n, q = self.claim, self.loop, len(self.claim.rows), self.q
+        filtered = [claim.half_widths[row] for row in claim.input_map for _ in range(claim.leads)]
+        scale = [*claim.half_widths, *claim.network_bound, *filtered]
         own = claim.networks
 
-        def action(i: int) -> list[Interval]:
-            """-b_i Q_i - c_i over (z, c)."""
-            row = [mul(neg(loop.half[i]), v) for v in error(i)]
+        def action(i: int, error: list[Interval]) -> list[Interval]:
+            """-b_i times an error, less c_i."""
+            row = [mul(neg(loop.half[i]), v) for v in error]
             if i in own:
                 row[n + own.index(i)] = add(row[n + own.index(i)], (Fraction(-1), Fraction(-1)))
             return row
 
         def error(i: int) -> list[Interval]:
-            """Q_i over (z, c)."""
-            row, target = [ZERO] * (n + q), claim.rows[i]["target"]
+            """Q_i."""
+            row, target = [ZERO] * len(scale), claim.rows[i]["target"]
             row[i] = (Fraction(1), Fraction(1))
-            return (
-                [add(v, neg(w)) for v, w in zip(row, action(target), strict=True)]
-                if isinstance(target, int) else row
-            )  # fmt: skip
+            if not isinstance(target, int):
+                return row
+            return [add(v, neg(w)) for v, w in zip(row, action(target, error(target)), strict=True)]
 
-        acts = [[mul(v, _point(s / claim.input_bound[k])) for v, s in zip(action(row), scale, strict=True)]
-                for k, row in enumerate(claim.input_map)]  # fmt: skip
+        acts, smooths = [], []
+        for k, i in enumerate(claim.input_map):
+            places = [n + q + place for place in claim.places_of_leads(i)]
+            ahead, following = sections(error(i), loop.gain[i], claim.period, places)
+            acts.append(_in_units(action(i, ahead), scale, claim.input_bound[k]))
+            smooths += [_in_units(row, scale, claim.half_widths[i]) for row in following]
         learns = []
         for j, i in enumerate(own):
             rate = mul(loop.gain[i].gamma, _point(claim.period / claim.network_bound[j]))
             learns.append([mul(mul(rate, v), _point(s)) for v, s in zip(error(i), scale, strict=True)])
+        need(all(row[i] == ZERO for row in (*acts, *learns, *smooths) for i in claim.lags), "a lag is not measured")
+        acts, learns, smooths = ([self._spaced(row) for row in part] for part in (acts, learns, smooths))
         (self.act, self.act_spread), (self.learn, self.learn_spread) = split_of(acts), split_of(learns)
+        self.smooth, self.smooth_spread = split_of(smooths)
         starts = []
         for i, row in enumerate(claim.rows):
             start, target = [ZERO] * (n + q), row["target"]
@@ -114,10 +149,25 @@ class Turn:
                 start[target] = mul(neg(loop.gain[target].beta), _point(Fraction(1, 2)))
                 if target in own:
                     start[n + own.index(target)] = _point(Fraction(-1))
-            starts.append([mul(v, _point(s / claim.half_widths[i])) for v, s in zip(start, scale, strict=True)])
+            starts.append(
+                [mul(v, _point(s / claim.half_widths[i])) for v, s in zip(start, scale[: n + q], strict=True)]
+            )
+        starts = [self._spaced(row) for row in starts] + [[ZERO] * (self.n + q) for _ in claim.lags]
         self.start, self.start_spread = split_of(starts)
         self.noise = [up(v / r) for v, r in zip(claim.noise, claim.half_widths, strict=True)]
+        self.noise += [Fraction(0)] * len(claim.lags)
         self.blur = [up(loop.term_noise(row) / claim.input_bound[k]) for k, row in enumerate(claim.input_map)]
+
+    @property
+    def followed(self) -> list[tuple[int, int, Fraction]]:
+        """Place of each ζ among the states, the row that it follows, and the largest |δ| of that."""
+        n = len(self.claim.rows)
+        return [(n + k, i, share) for k, (i, share) in enumerate(zip(self.claim.lags, self.lagging, strict=True))]
+
+    def _spaced(self, row: list[Interval]) -> list[Interval]:
+        """A row over (z, …) with a place for the states of lags after z."""
+        n = len(self.claim.rows)
+        return [*row[:n], *[ZERO] * len(self.claim.lags), *row[n:]]
 
     def _observer(self) -> None:
         """What the controller sees of z, over the columns; what is bounded of an observer, and rounding of its gains.
@@ -159,7 +209,7 @@ class Turn:
             self.flow[i][:n] = self.a[i]
             for j, row in enumerate(claim.networks):
                 self.flow[i][n + j] = sum((self.b[i][k] * self.direct[k][j] for k in range(m)), Fraction(0))
-                if claim.rows[i]["target"] == row:
+                if i < len(claim.rows) and claim.rows[i]["target"] == row:
                     self.sources[i][n + j] = bounds[j] / claim.half_widths[i]
 
     def turned(self) -> Matrix:
@@ -183,7 +233,8 @@ class Turn:
         """What the controller makes of what it sees and of its networks, with a pulse of its own, over the columns."""
         made = [dot(row[: self.n], column) for column in zip(*self.seen, strict=True)]
         for j, value in enumerate(row[self.n :]):
-            made[self.n + j] += value
+            # the states of an observer stand between networks and leads
+            made[self.n + j + (self.w if j >= self.q else 0)] += value
         made[own] += 1
         return made
 
@@ -229,6 +280,8 @@ class Turn:
             fold[n + j][n + j] = Fraction(-1)
             kept[n + j] = self._computed(self.learn[j], order + m + j)
             kept[n + j][n + j] += 1
+        for j, row in enumerate(self.smooth):
+            kept[n + q + self.w + j] = self._computed(row, order + m + q + j)
         for i in range(self.w):
             kept[n + q + i] = [dot(self.ahead[i], column) for column in zip(*self.seen[:2], strict=True)]
         moved = ball(kept)
@@ -247,7 +300,7 @@ class Turn:
         first = [_sum(row, noise) for row, noise in zip(begin, unit[n + q : 2 * n + q], strict=True)]
         if self.w:  # an observer starts from the first measurement, and at the reference's speed
             first[1] = [Fraction(0)] * width
-        begin = [*begin, *unit[n : n + q], *first[: self.w]]
+        begin = [*begin, *unit[n : n + q], *first[: self.w], *[[Fraction(0)] * width] * self.filters]
         for _ in range(claim.pending):
             for k, row in enumerate(self.act):
                 made = [dot(row[:n], column) for column in zip(*first, strict=True)]
@@ -263,6 +316,7 @@ class Turn:
         """
         claim, n, q = self.claim, self.n, self.q
         first = [up(v / r) for v, r in zip(claim.initial, claim.half_widths, strict=True)]
+        first += [Fraction(0)] * len(claim.lags)
         for j, i in enumerate(claim.networks):
             (low, high), preload = claim.demand[j], self.loop.gain[i].preload
             away = max(abs(preload - low), abs(high - preload)) + ROUNDING * abs(preload)
@@ -270,13 +324,20 @@ class Turn:
         loose = [dot(row, first) for row in self.start_spread]
         size = [dot(map(abs, row), first) for row in self.start]
         unsure = [up(v) for v in loose] + [Fraction(0)] * q + [up(v) for v in loose[: self.w]]
+        unsure += [Fraction(0)] * self.filters
         felt = [z + w + noise for z, w, noise in zip(size, loose, self.noise, strict=True)] + first[n:]
+        felt += [Fraction(0)] * self.filters
         held = [up(dot(map(abs, self.act[k][:n]), loose) + dot(self.act_spread[k], felt)) for k in range(self.m)]
         return [*first, *self.noise, *self.blur], unsure + held * claim.pending
 
 
 def _sum(*rows: list[Fraction]) -> list[Fraction]:
     return [sum(column, Fraction(0)) for column in zip(*rows, strict=True)]
+
+
+def _in_units(row: list[Interval], units: list[Fraction], own: Fraction) -> list[Interval]:
+    """A row over other units, in its own."""
+    return [mul(v, _point(unit / own)) for v, unit in zip(row, units, strict=True)]
 
 
 def _point(value: Fraction) -> Interval:

@@ -47,6 +47,23 @@ class Expression:
                 seen.update(arguments)
         return found
 
+    def only(self, outputs: Sequence[int]) -> Expression:
+        """The program of some entries alone."""
+        kept, fresh = set(outputs), list(outputs)
+        while fresh:
+            operator, *arguments = self.operations[fresh.pop()]
+            if operator not in ("input", "const"):
+                fresh += [index for index in arguments if index not in kept]
+                kept.update(arguments)
+        place = {old: new for new, old in enumerate(sorted(kept))}
+        made = []
+        for old in sorted(kept):
+            operator, *arguments = self.operations[old]
+            plain = operator in ("input", "const")
+            made.append((operator, *(arguments if plain else (place[index] for index in arguments))))
+        read = tuple(operation[1] for operation in made if operation[0] == "input")
+        return Expression(inputs=read, operations=tuple(made), outputs=tuple(place[index] for index in outputs))
+
     def joined(self, names: Sequence[str]) -> Expression:
         """The program with the quotients of two inputs that are named "A/B" as inputs of their own."""
         if not names:

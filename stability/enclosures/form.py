@@ -80,6 +80,10 @@ class Symbols:
         """A number for an operation; the same for the same operator on the same arguments."""
         return self._keys.setdefault(operation, len(self._keys))
 
+    def copy(self) -> Symbols:
+        """A table of its own with the same symbols."""
+        return Symbols(dict(self.ranges), dict(self.definitions), dict(self._named), dict(self._keys))
+
     def range_of(self, form: Form) -> Interval:
         """The range of a form over the ranges of its symbols."""
         return form.constant + total(c * self.ranges[s] for s, c in form.coefficients.items())

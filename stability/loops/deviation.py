@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from ..enclosures.form import ONE, Form
 from ..enclosures.interval import Interval, total
+from .balance import balance
 from .box import Box, DeviationRows, UnboundedError, over
-from .model import Bounds, Gains, LoopModel
+from .model import Bounds, Gains, LoopModel, balance_of
 from .observer import SHOWN
 from .rows import Builder
 
@@ -30,6 +31,8 @@ Array = NDArray[np.float64]
 NOTHING = 1e-9
 #: Steps in which the demand of the load networks settles.
 SETTLING = 4
+#: Room for the demands in a larger box, as a share of them.
+MOVED = 1e-3
 #: Gains may be rounded to float32 on their way into a machine; the bounds cover twice that.
 ROUNDED = Interval(1 - 2.0**-22, 1 + 2.0**-22)
 
@@ -69,11 +72,19 @@ def first_box(
     return box, rows
 
 
-def _demanding(box: Box, rows: DeviationRows) -> Box:
-    """The box with the demands of these rows, and a little room."""
+def _demanding(box: Box, rows: DeviationRows, room: float = 1e-6) -> Box:
+    """The box with the demands of these rows, and a little room as a share of them."""
     low, high = rows.demand.T
-    room = 1e-6 * np.maximum(np.abs(low), np.abs(high))
-    return replace(box, low=low - room, high=high + room)
+    more = room * np.maximum(np.abs(low), np.abs(high))
+    return replace(box, low=low - more, high=high + more)
+
+
+def demanded(box: Box, rows: DeviationRows) -> Box | None:
+    """The box with room for the demands of these rows, None where they are in it: what a mode carries depends on it."""
+    low, high = rows.demand.T
+    if (box.low <= low).all() and (high <= box.high).all():
+        return None
+    return _demanding(box, rows, room=MOVED)
 
 
 def rounded(values: Array) -> Array:
@@ -161,8 +172,12 @@ class _Builder(Builder):
             forces, masses, [f.scaled(ONE / mass) for f, mass in zip(forces, masses, strict=True)]
         )
         places = {i: self.model.driven[i] for i in self.networks}
+        held = [*places.values(), *self.model.balanced.values()]
+        if len(set(held)) < len(held):
+            raise ValueError("a row is held by one load network or one mode")
         demands = {i: self._demand(i, raw[k], rows[k], masses[k], self.target_rate[k]) for i, k in places.items()}
         rest = {places[i]: demand.rest for i, demand in demands.items()}
+        rest |= {k: self._carried(i, raw[k], masses[k]) for i, k in self.model.balanced.items()}
         left = [rest[k] if k in rest else self._disturbance(row, "Qe") for k, row in enumerate(rows)]
         halves = [self.half_gain[i] * ROUNDED for i in self.model.controlled]
         inputs = self.model.input_map
@@ -222,9 +237,21 @@ class _Builder(Builder):
             lean=(left.low + left.high) / 2, settled=rested.magnitude / least, resting=still / drive,
         )  # fmt: skip
 
+    def _carried(self, i: int, raw: Form, mass: Interval) -> float:
+        """What is left of a row that the state of row i balances."""
+        own, row = f"w:{balance_of(self.model.rows[i].state)}", self.model.rows[self.model.balanced[i]]
+        found = balance(raw, own, mass, self._rate_of(row), self._rates_of_signals(), self.symbols)
+        needed, span = found.range(self.symbols.ranges), self.symbols.ranges[own]
+        if not (span.low <= needed.low and needed.high <= span.high):
+            raise ValueError(f"what {self.model.rows[i].state} carries does not settle")
+        return self.symbols.range_of(found.left).magnitude
+
     def _resting(self) -> dict[str, Interval]:
-        """The reference while it rests at first."""
-        return {f"r{k}": Interval(self.bounds.rest[0] if k == 0 else 0.0) for k in range(4)}
+        """The reference while it rests at first, and what modes carry then."""
+        still = {f"r{k}": Interval(self.bounds.rest[0] if k == 0 else 0.0) for k in range(4)}
+        known = {**self.symbols.ranges, **still}
+        held = {f"w:{balance_of(self.model.rows[i].state)}": found.range(known) for i, found in self.balances.items()}
+        return still | held
 
     def _drive(self, i: int, raw: Form, row: Form) -> tuple[Interval, bool]:
         """The effect of φ̂_i on its row, and whether it is constant.
@@ -237,10 +264,3 @@ class _Builder(Builder):
         if not found.low > 0:
             raise ValueError(f"the load network of row {i + 1} has no effect of a known sign")
         return found, direct.low > 0
-
-    def _rates_of_signals(self) -> dict[str, Interval]:
-        """Rate of each signal whose rate is bounded."""
-        ranges = self.bounds.reference
-        return {f"r{k}": ranges[k + 1] for k in range(3)} | {
-            f"w:{name}": rate for name, (_, rate) in self.rated.items()
-        }

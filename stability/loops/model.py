@@ -14,7 +14,13 @@ from .observer import Observer
 #: The signal of a target that is one, and the derivatives of the reference that have a bounded rate.
 CONSTANT, SIGNALS = "constant", ("r0", "r1", "r2")
 #: What rows track that follow no other row, as sums of signals.
+BALANCE = "balance"
 ALONE: Mapping[str, Mapping[str, float]] = {"reference": {"r0": 1.0}, "zero": {}}
+
+
+def balance_of(state: str) -> str:
+    """The signal that is the value of a state with which the row that reads it moves as is asked for."""
+    return f"@{state}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +32,8 @@ class Row:
         unit: Unit of its state.
         target: "reference" (r0), "zero", the index of the row whose virtual control is the target, or, where the law
             does not act, coefficients of r0, r1, r2, "constant", "DISTURBANCE" and "DISTURBANCE/PARAMETER": their sum
-            is the value of the state in the motion that is asked for.
+            is the value of the state in the motion that is asked for. Or "balance": the value with which the only
+            other row that reads the state moves as is asked for.
         controlled: True where the RAC law acts in this row; False for an actuator lag.
     """
 
@@ -40,6 +47,8 @@ class Row:
         """Coefficients of the signals whose sum is the target; none where a row follows another."""
         if isinstance(self.target, int):
             return {}
+        if self.target == BALANCE:
+            return {balance_of(self.state): 1.0}
         return ALONE[self.target] if isinstance(self.target, str) else self.target
 
 
@@ -53,6 +62,7 @@ class LoopModel:
         inputs: Names of the plant inputs.
         plant: Outputs M_1…M_n (constant in time), h_1…h_n; inputs: states, plant inputs, parameters, disturbances.
         law: One modelling term m_i for each controlled row; inputs: states, r0…r3, ``nominal.NAME``.
+        leads: Sections of lead between the error of an input's row and its proportional part.
     """
 
     rows: tuple[Row, ...]
@@ -60,6 +70,7 @@ class LoopModel:
     inputs: tuple[str, ...]
     plant: Expression
     law: tuple[Expression, ...]
+    leads: int = 0
 
     @property
     def controlled(self) -> tuple[int, ...]:
@@ -70,6 +81,21 @@ class LoopModel:
     def rings(self) -> bool:
         """Whether there is a mode that the law leaves to itself: states that follow no row and no law."""
         return any(row.place and not row.controlled for row in self.rows)
+
+    @cached_property
+    def balanced(self) -> Mapping[int, int]:
+        """For each row whose target is a balance, the row that it balances."""
+        return {i: self._balanced(i) for i, row in enumerate(self.rows) if row.target == BALANCE}
+
+    def _balanced(self, i: int) -> int:
+        """The only other row that reads the state of row i."""
+        outputs = self.plant.outputs[len(self.rows) :]
+        found = [j for j, own in enumerate(outputs) if j != i and self.rows[i].state in self.plant.reads(own)]
+        if len(found) != 1:
+            raise ValueError(
+                f"a state balances the only other row that reads it: {len(found)} read {self.rows[i].state}"
+            )
+        return found[0]
 
     @cached_property
     def quotients(self) -> list[str]:
@@ -113,6 +139,7 @@ class LoopModel:
             "inputs": list(self.inputs),
             "plant": self.plant.to_data(),
             "law": [term.to_data() for term in self.law],
+            **({"leads": self.leads} if self.leads else {}),
         }
 
 
@@ -128,6 +155,8 @@ class Gains:
         gamma: Gain γ ≥ 0 of the load network φ̂; 0 switches it off.
         capacity: Φ, what |φ̂| is kept below; above 0 where γ is.
         preload: φ̂ at the start.
+        lead: Time a ≥ 0 of each section of lead (1 + a s)/(1 + f s), s; see `lead.py`.
+        smooth: Time f ≥ 0 of their filters, s; a section with a = f changes nothing.
     """
 
     beta: float
@@ -137,6 +166,8 @@ class Gains:
     gamma: float = 0.0
     capacity: float = 0.0
     preload: float = 0.0
+    lead: float = 0.0
+    smooth: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -50,16 +50,16 @@ UNFELT = 1e-12
 #: Groups at most.
 LONGEST = 400
 #: Weights of a period in the transient, as powers of the slowest mode.
-SHARES = (0.5, 0.8, 0.93)
+SHARES = (0.2, 0.5, 0.8, 0.93)
 
 
 @dataclass(frozen=True)
 class Sums:
-    """L1 norms from what acts to the outputs (z, s, v, c, and what is bounded of an observer).
+    """L1 norms from what acts to the outputs (z, s, v, c, w of leads, and what is bounded of an observer).
 
     Attributes:
         rest: From ρ_1 … ρ_n and the rates of the demands. Shape (outputs, n + q).
-        pulses: From errors of the new inputs, of the networks and of an observer's ẑ. Shape (outputs, m + q + w).
+        pulses: From errors of the new inputs, of networks, leads and an observer's ẑ. Shape (outputs, pulses).
         noise: From measurement errors. Shape (outputs, n).
         begin: Largest responses to what Z(0) is made of. Shape (outputs, 2 n + q + m).
     """

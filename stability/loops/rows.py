@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ..enclosures.form import ONE, Form, Symbols, Value, evaluate, tangent
 from ..enclosures.interval import Interval
-from .model import CONSTANT, SIGNALS, Bounds, Gains, LoopModel
+from .balance import STEPS, WIDER, Balance, balance
+from .model import ALONE, CONSTANT, SIGNALS, Bounds, Gains, LoopModel, Row, balance_of
 
 Array = NDArray[np.float64]
 
@@ -116,11 +117,51 @@ class Builder:
             self._quotient(name, *name.split("/", 1))
         for k in range(4):
             self.inputs[f"r{k}"] = self.symbols.value(f"r{k}", Form.of(f"r{k}"))
+        self.balances = {i: self._balance(i, k) for i, k in model.balanced.items()}
         self.noise: dict[int, float] = {}
         self.theta_max: dict[int, float] = {}
         self.theta_rate: dict[int, float] = {}
         self.half_gain: dict[int, Interval] = {}
         self.model_term: dict[int, Form] = {}
+
+    def _balance(self, i: int, k: int) -> Balance:
+        """What row i carries so that row k moves as is asked for: a signal of bounded rate."""
+        model, rates = self.model, self._rates_of_signals()
+        n, name = len(model.rows), balance_of(model.rows[i].state)
+        own, row = f"w:{name}", model.rows[k]
+        if row.target not in ALONE:
+            raise ValueError(f"a balance is of a row that tracks the reference: got {row.state}")
+        program = model.program.only([model.plant.outputs[j] for j in (k, n + k)])
+        span = Interval(0.0)
+        for _ in range(STEPS):
+            symbols = self.symbols.copy()
+            symbols.ranges[own] = span
+            inputs = {
+                **self.inputs,
+                model.rows[i].state: symbols.value(model.rows[i].state, Form({f"Q{i}": ONE, own: ONE})),
+            }
+            inputs[row.state] = symbols.value(
+                row.state, Form({f"Q{k}": ONE, **{s: Interval(v) for s, v in row.place.items()}})
+            )
+            mass, force = evaluate(program, inputs, symbols)
+            found = balance(force.form, own, mass.range, self._rate_of(row), rates, symbols)
+            needed = found.range(symbols.ranges)
+            if span.low <= needed.low and needed.high <= span.high:
+                self.symbols.ranges[own], self.rated[name] = span, (span, found.rate(rates))
+                return found
+            span = needed + Interval.symmetric(WIDER * needed.magnitude)
+        raise ValueError(f"what {model.rows[i].state} carries does not settle")
+
+    def _rate_of(self, row: Row) -> Form:
+        """The rate of the target of a row that tracks nothing but the reference."""
+        return Form({f"r{int(s[1]) + 1}": Interval(v) for s, v in row.place.items()})
+
+    def _rates_of_signals(self) -> dict[str, Interval]:
+        """Rate of each signal whose rate is bounded."""
+        ranges = self.bounds.reference
+        return {f"r{k}": ranges[k + 1] for k in range(3)} | {
+            f"w:{name}": rate for name, (_, rate) in self.rated.items()
+        }
 
     def _quotient(self, name: str, load: str, parameter: str) -> None:
         """A disturbance of bounded rate over a constant, which is another one."""

@@ -1,10 +1,11 @@
 """One control period of the whole sampled loop: plant deviations, load networks and pending inputs as one exact map.
 
-    z' = a z + b v + ρ,   p_k' = φ*_k',   v = held + p,      Z = (z, c, w, pending inputs, newest first)
+    z' = a z + b v + ρ,   p_k' = φ*_k',   v = held + p,      Z = (z, c, ξ, w, pending inputs, newest first)
 
 inside a period, where p is what a demand moves since the last sample; z_i' gets φ*_j' where row i tracks a row j with
-a network. At a sample v_new = -K ẑ - C c, c <- A c + G ẑ - p, the pending inputs move on by one and by p. ẑ is z as it
-is measured, or for the first two states what an observer with the states w makes of the first. With a delay
+a network. At a sample the new input, c and w, the states of sections of lead, are sums of ẑ, c and w; c moves by -p
+too, and the pending inputs move on by one and by p. ẑ is z as it
+is measured, or for the first two states what an observer with the states ξ makes of the first. With a delay
 of so many whole periods and a share, the input switches from one pending value to the next at that share of a period.
 With jitter it may switch earlier or later: that is a kick to z at this instant, as large as what acts meanwhile makes.
 """
@@ -12,15 +13,18 @@ With jitter it may switch earlier or later: that is a kick to z at this instant,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..enclosures.interval import Interval
 from .box import DeviationRows
 from .deviation import ROUNDED, networks
+from .lead import sections
 from .model import Gains, LoopModel
 from .observer import SHOWN, STATES, Observer
+from .ranges import Range
 from .substep import integrals_of
 
 Array = NDArray[np.float64]
@@ -33,91 +37,79 @@ MAX_DELAY = 8
 
 @dataclass(frozen=True, kw_only=True)
 class Controller:
-    """The discrete part of the loop in deviations.
+    """The discrete part of the loop in deviations: rows over (ẑ, c, w of the leads), middles and radii.
 
     Attributes:
-        feedback: K. Shape (m, n).
-        feedback_spread: Its radius.
-        network: C. Shape (m, q).
-        network_spread: Its radius.
-        entry: G. Shape (q, n).
-        entry_spread: Its radius.
-        keep: A. Shape (q, q).
-        keep_spread: Its radius.
+        act: The new inputs v. Shape (m, n + q + l).
+        act_spread: Its radius.
+        learn: C at the next sample. Shape (q, n + q + l).
+        learn_spread: Its radius.
+        smooth: w at the next sample. Shape (l, n + q + l).
+        smooth_spread: Its radius.
         start: z over (Q, c) where nothing has been adapted yet. Shape (n, n + q).
     """
 
-    feedback: Array
-    feedback_spread: Array
-    network: Array
-    network_spread: Array
-    entry: Array
-    entry_spread: Array
-    keep: Array
-    keep_spread: Array
+    act: Array
+    act_spread: Array
+    learn: Array
+    learn_spread: Array
+    smooth: Array
+    smooth_spread: Array
     start: Array
 
 
 def controller(model: LoopModel, gains: tuple[Gains, ...], rows: DeviationRows, period: float) -> Controller:
-    """Q_i = z_i + b_j Q_j + c_j along the rows that track each other; v = -b Q - c; c <- c + T γ Q."""
+    """Q_i = z_i + b_j Q_j + c_j along the rows that track each other; v = -b L Q - c; c <- c + T γ Q; w of L."""
     governed, own = list(model.controlled), networks(model, gains)
     n, q = len(model.rows), len(own)
-    found: dict[int, _Range] = {}
+    size = n + q + model.leads * len(model.inputs)
+    found: dict[int, Range] = {}
+    filters: list[Range] = []
 
-    def error(i: int) -> _Range:
-        """Q_i over (z, c)."""
+    def error(i: int) -> Range:
+        """Q_i."""
         if i not in found:
-            value, target = _Range.of(np.eye(n, n + q)[i]), model.rows[i].target
-            found[i] = value + action(target).times(-1.0, -1.0) if isinstance(target, int) else value
+            value, target = _unit(size, i), model.rows[i].target
+            if isinstance(target, int):
+                value = value + action(target, error(target)).times(Interval(-1.0))
+            found[i] = value
         return found[i]
 
-    def action(i: int) -> _Range:
-        """κ_i less its operating value, over (z, c): -b_i Q_i - c_i."""
+    def action(i: int, error: Range) -> Range:
+        """κ_i less its operating value: -b_i times an error, less c_i."""
         g = governed.index(i)
-        control = error(i).times(-rows.half_high[g], -rows.half_low[g])
-        return control + _Range.of(-np.eye(q, n + q, n)[own.index(i)]) if i in own else control
+        control = error.times(Interval(-rows.half_high[g], -rows.half_low[g]))
+        return control + _unit(size, n + own.index(i)).times(Interval(-1.0)) if i in own else control
 
-    actions = [action(row) for row in model.input_map]
+    def leading(k: int, i: int) -> Range:
+        """What the leads of input k make of Q_i; keeps what they remember."""
+        g, first = gains[governed.index(i)], n + q + model.leads * k
+        times = Interval(g.lead) * ROUNDED, Interval(g.smooth) * ROUNDED
+        ahead, following = sections(error(i), *times, period, list(range(first, first + model.leads)))
+        filters.extend(following)
+        return ahead
+
+    actions = [action(i, leading(k, i)) for k, i in enumerate(model.input_map)]
     rates = [period * gains[governed.index(i)].gamma for i in own]
-    learned = [error(i).times(r * ROUNDED.low, r * ROUNDED.high) for i, r in zip(own, rates, strict=True)]
-    (control, loose), (values, spreads) = (
-        (np.array([r.middle for r in part]).reshape(-1, n + q), np.array([r.radius for r in part]).reshape(-1, n + q))
-        for part in (actions, learned)
-    )
+    learned = [
+        _unit(size, n + j) + error(i).times(Interval(r) * ROUNDED)
+        for j, (i, r) in enumerate(zip(own, rates, strict=True))
+    ]
+    (act, loose), (learn, spread), (smooth, astray) = (_split(part, size) for part in (actions, learned, filters))
     return Controller(
-        feedback=-control[:, :n], feedback_spread=loose[:, :n], network=-control[:, n:], network_spread=loose[:, n:],
-        entry=values[:, :n], entry_spread=spreads[:, :n], keep=np.eye(q) + values[:, n:], keep_spread=spreads[:, n:],
+        act=act, act_spread=loose, learn=learn, learn_spread=spread, smooth=smooth, smooth_spread=astray,
         start=_start(model, gains, own),
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Range:
-    """Rows between two."""
+def _unit(size: int, place: int) -> Range:
+    return Range.of(np.eye(size)[place])
 
-    low: Array
-    high: Array
 
-    @classmethod
-    def of(cls, row: Array) -> _Range:
-        """One row."""
-        return cls(row, row)
-
-    @property
-    def middle(self) -> Array:
-        return (self.low + self.high) / 2
-
-    @property
-    def radius(self) -> Array:
-        return (self.high - self.low) / 2
-
-    def __add__(self, other: _Range) -> _Range:
-        return _Range(self.low + other.low, self.high + other.high)
-
-    def times(self, low: float, high: float) -> _Range:
-        """With a number between two."""
-        ends = [end * factor for end in (self.low, self.high) for factor in (low, high)]
-        return _Range(np.min(ends, axis=0), np.max(ends, axis=0))
+def _split(rows: list[Range], size: int) -> tuple[Array, Array]:
+    """Middles and radii. Shapes (rows, size)."""
+    parts = [[r.middle for r in rows], [r.radius for r in rows]]
+    return np.array(parts[0]).reshape(-1, size), np.array(parts[1]).reshape(-1, size)
 
 
 def _start(model: LoopModel, gains: tuple[Gains, ...], own: list[int]) -> Array:
@@ -147,6 +139,7 @@ class Stack:
         share: The rest of the delay as a share of the period, 0 or more and below 1.
         observer: What makes ẑ_1 and ẑ_2 of z_1; None where all are measured.
         jitter: How much earlier or later than that an input may begin to act, s.
+        lags: Rows that are followed by a state ζ of their own each, see `with_lags`.
     """
 
     a: Array
@@ -159,6 +152,7 @@ class Stack:
     share: float
     observer: Observer | None = None
     jitter: float = 0.0
+    lags: tuple[int, ...] = ()
 
     @property
     def watched(self) -> int:
@@ -182,9 +176,14 @@ class Stack:
 
     @property
     def pulses(self) -> int:
-        """Number of what acts at samples beside measurement errors: on inputs, networks, ẑ of an observer; kicks."""
+        """Number of what acts at samples beside measurement errors: on inputs, networks, leads, ẑ; kicks."""
         _, m, q = self.sizes
-        return m + q + self.watched + self.kicked
+        return m + q + self.leads + self.watched + self.kicked
+
+    @property
+    def leads(self) -> int:
+        """Number of states w of sections of lead."""
+        return len(self.control.smooth)
 
     def meanwhile(self) -> tuple[Array, Array]:
         """Entrywise bounds on |e^{a s}| and on its integral over 0 <= s <= jitter. Shapes (n, n)."""
@@ -204,8 +203,14 @@ class Stack:
     @property
     def order(self) -> int:
         """Length of Z."""
-        n, m, q = self.sizes
-        return n + q + self.watched + m * self.pending
+        m = self.sizes[1]
+        return self.first + m * self.pending
+
+    @property
+    def first(self) -> int:
+        """Where the pending inputs begin in Z."""
+        n, _, q = self.sizes
+        return n + q + self.watched + self.leads
 
     def seen(self) -> tuple[Array, Array]:
         """ẑ over z, measurement errors alike, and over w. Shapes (n, n), (n, w)."""
@@ -233,10 +238,11 @@ class Stack:
         if self.observer is not None:
             made[n + q, : n + q], made[n + q, n + q] = ctl.start[0], 1.0
         of_states, of_observer = self.seen()
-        first = -ctl.feedback @ (of_states @ made[:n] + of_observer @ made[n + q : n + q + self.watched])
-        first[:, n : n + q] -= ctl.network
-        first[:, n + q :] += np.hstack([-ctl.feedback @ of_states, np.eye(m)])
-        made[n + q + self.watched :] = np.tile(first, (self.pending, 1))
+        act = ctl.act[:, :n]
+        first = act @ (of_states @ made[:n] + of_observer @ made[n + q : n + q + self.watched])
+        first[:, n : n + q] += ctl.act[:, n : n + q]
+        first[:, n + q :] += np.hstack([act @ of_states, np.eye(m)])
+        made[self.first :] = np.tile(first, (self.pending, 1))
         return made
 
     def flow(self) -> Array:
@@ -252,6 +258,26 @@ class Stack:
         entry = np.eye(n + q)
         entry[:n, n:] = self.steering
         return entry
+
+
+def with_lags(stack: Stack, lags: tuple[int, ...]) -> Stack:
+    """The stack with another state ζ for each row i of `lags`: ζ' = a_ii ζ + s_i, at zero at the start.
+
+    Where M_i is (1 + δ)⁻¹ times what it counts as, z_i' = (1 + δ) s_i + …, and δ s_i acts as δ ζ_i would that is added
+    to z_i wherever that is read: ζ has passed the lag itself, and is smaller than what s_i makes of measurement errors.
+    """
+    if not lags:
+        return stack
+    (n, _, _), own, count = stack.sizes, list(lags), len(lags)
+    a = np.zeros((n + count, n + count))
+    a[:n, :n], a[n:, :n], a[n:, n:] = stack.a, stack.a[own], np.diag(np.diag(stack.a)[own])
+    ctl = stack.control
+    wide = {key: np.insert(getattr(ctl, key), [n] * count, 0.0, axis=1) for key in Controller.__dataclass_fields__}
+    wide["start"] = np.vstack([wide["start"], np.zeros((count, wide["start"].shape[1]))])
+    steering = np.vstack([stack.steering, np.zeros((count, stack.steering.shape[1]))])
+    return replace(
+        stack, a=a, b=np.vstack([stack.b, stack.b[own]]), steering=steering, control=Controller(**wide), lags=lags
+    )
 
 
 def delay_of(delay: float, period: float) -> tuple[int, float]:

@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 class Turn:
     """A period of a stack on a grid of sub-steps that holds the switch of the input.
 
-    Columns are over Z, then pulses on the new inputs, on the networks and on ẑ of an observer, kicks of jitter, and
-    measurement errors of the states.
+    Columns are over Z, then pulses on the new inputs, on the networks, on the leads and on ẑ of an observer, kicks of
+    jitter, and measurement errors of the states.
 
     Attributes:
         steps: Length of each sub-step, s.
@@ -26,8 +26,8 @@ class Turn:
         held: The input that acts in each sub-step. Shape (steps, m, columns).
         image: Z at the next sample. Shape (order, columns).
         fold: How (z, p) at the end of a period enters Z. Shape (order, n + q).
-        shown: c and what is bounded of an observer, at a sample; how much the input changes that acts in this period.
-            Shape (q + 3 or q, and m with jitter, columns).
+        shown: c, w of the leads and what is bounded of an observer, at a sample; how much the input changes that acts
+            in this period. Shape (q + l, and 3 with an observer, and m with jitter, columns).
     """
 
     steps: Array
@@ -45,14 +45,17 @@ def turn(stack: Stack, count: int) -> Turn:
 
     n, m, q = stack.sizes
     order, waiting, watched, ctl = stack.order, stack.pending, stack.watched, stack.control
-    columns, first = order + stack.pulses + n, n + q + watched
+    columns, first, filters = order + stack.pulses + n, stack.first, stack.leads
     unit = np.eye(columns)
-    pulse, learn, astray, kick, noise = np.split(unit[order:], np.cumsum((m, q, watched, stack.kicked)))
+    pulse, learn, smooth, astray, kick, noise = np.split(
+        unit[order:], np.cumsum((m, q, filters, watched, stack.kicked))
+    )
     of_states, of_observer = stack.seen()
-    seen = of_states @ (unit[:n] + noise) + of_observer @ unit[n + q : first]
+    seen = of_states @ (unit[:n] + noise) + of_observer @ unit[n + q : n + q + watched]
     seen[:watched] += astray
-    networks = unit[n : n + q]
-    fresh = pulse - ctl.feedback @ seen - ctl.network @ networks
+    networks, remembered = unit[n : n + q], unit[first - filters : first]
+    known = np.vstack([seen, networks, remembered])
+    fresh = pulse + ctl.act @ known
 
     def waited(k: int) -> Array:
         """The input computed k samples ago."""
@@ -86,13 +89,14 @@ def turn(stack: Stack, count: int) -> Turn:
     for k in range(waiting):
         fold[first + m * k : first + m * (k + 1), n:] = stack.direct
     image = fold @ x
-    image[n : n + q] += learn + ctl.entry @ seen + ctl.keep @ networks
-    image[n + q : first] += stack.ahead[:watched] @ seen[:2] if watched else 0.0
+    image[n : n + q] += learn + ctl.learn @ known
+    image[n + q : n + q + watched] += stack.ahead[:watched] @ seen[:2] if watched else 0.0
+    image[first - filters : first] += smooth + ctl.smooth @ known
     for k in range(waiting):
         image[first + m * k : first + m * (k + 1)] += waited(k)
     of_observer = [(seen - unit[:n])[:2], (unit[0] + noise[0] - unit[n + q])[None]] if watched else []
     changes = waited(stack.whole) - waited(stack.whole + 1) if stack.turned else unit[:0]
-    shown = np.vstack([networks, *of_observer, changes])
+    shown = np.vstack([networks, remembered, *of_observer, changes])
     return Turn(
         steps=np.array(steps), begin=np.array(begin), end=np.array(end), held=np.array(acting), image=image, fold=fold,
         shown=shown
