@@ -19,6 +19,7 @@ from ..files.state import State
 from ..problem import GainSet
 from ..simulation import Loop, Run, Scenario, rated, within_assumptions
 from ..simulation.scenario import Course
+from .matched import matched
 from .worst_case import EDGE, uncertain
 
 Array = NDArray[np.float64]
@@ -50,8 +51,9 @@ def falsify(
         state: Keeps the errors of the runs, so that an interrupted search can go on.
 
     Returns:
-        The worst run: constant, stepped, ramped, sinusoidal and bang-bang disturbances at the corners of the parameters
-        first, then CMA-ES (Hansen 2016) over parameters, start, and values or switching times of the disturbances.
+        The worst run: constant, stepped, ramped, sinusoidal and bang-bang disturbances, and with many runs those that
+        add up in the loop, at the corners of the parameters first, then CMA-ES (Hansen 2016) over parameters, start,
+        and values or switching times of the disturbances.
 
     Not guaranteed: that it is the worst case.
     """
@@ -129,7 +131,8 @@ class _Attack:
         left = self.budget - self.runs
         if left < 1:
             return
-        shapes = self._shapes()[: max(1, min(limit - 2 * len(self.names) - 4, left))]
+        matching = matched(self.loop, self.gains, self.free) if self.budget >= LARGE_BUDGET else []
+        shapes = [*matching, *self._shapes()][: max(1, min(limit - 2 * len(self.names) - 4, left))]
         errors = self.errors([make(disturbances=courses) for courses in shapes])
         courses = shapes[int(np.argmax(errors))]
         names = self.names[: max(0, (limit - self.runs) // 2)]
