@@ -9,6 +9,7 @@ from typing import Any
 
 from .limits import MAX_CELLS, MAX_COEFFICIENTS, MAX_GROUPS, MAX_LEADS, MAX_MEMBERS, MAX_OPERATIONS, MAX_ORDER, MAX_ROWS
 from .shape import (
+    Rule,
     entry_of,
     flag,
     listed,
@@ -107,7 +108,7 @@ STUDY = entry_of(
 PROGRAM = entry_of({"inputs": listed(text, 0, 200), "operations": listed(operation, 1, MAX_OPERATIONS),
                     "outputs": listed(whole, 1, 64)})  # fmt: skip
 EXACT = listed(ratio, 1, MAX_ROWS)
-MIDDLE = dict.fromkeys(("force", "drive"), listed(EXACT, 1, MAX_ROWS))
+MIDDLE: dict[str, Rule] = dict.fromkeys(("force", "drive"), listed(EXACT, 1, MAX_ROWS))
 CERTIFICATE = entry_of(
     {"kind": text, "half_widths": EXACT, "input_bound": EXACT,
      "networks": listed(entry_of(dict.fromkeys(("row", "low", "high", "middle", "bound"), ratio) | {"row": name}),
