@@ -73,6 +73,10 @@ balance: What a mode carries in the motion that is asked for, as the only other 
   b* = (M r' - Σ c s - c_0) / g is one of them, and around it what is left acts alone. Must fail: an effect without a
   sign, a row that two modes balance, what may change counted as constant.
 
+targets: What rows track: sums of signals, a balance, or quotients of a load and a constant.
+
+  Must fail: a signal without a bounded rate; it is refused where the loop is made.
+
 loop: The closed loop around the moving operating point, with the input as it is held.
 
   Theorem: interval enclosures of every coefficient (docs/proof.md). Must fail: a sign of plant or law, a smaller box,
@@ -87,6 +91,11 @@ jitter: An input that acts earlier or later than it should.
   Theorem: while another input acts than the nominal one, for a time of at most the jitter, z' differs by b times the
   change of the input and by what the uncertainty makes of that; so z is kicked by at most an integral of e^{|a| s}.
   Must fail: a larger jitter, one that is longer than the delay.
+
+lag: Rows that only follow what is commanded, with a time constant that is not known exactly.
+
+  Theorem: with M = M0/(1 + δ), δ constant, z' = (1 + δ) s + ..., and e = δ ζ, ζ' = a ζ + s, the rest z - e obeys the row
+  without δ s (docs/proof.md). Must fail: a row that reads anything else, that is measured, that does not contract.
 
 lead: Sections of lead between the error of an input's row and its proportional part.
 
@@ -2206,7 +2215,7 @@ def inside(inner: Interval, outer: Interval) -> bool:
     return outer[0] <= inner[0] and inner[1] <= outer[1]
 
 
-# --- loop ---
+# --- targets ---
 
 #: Derivatives of the reference that have a bounded rate.
 SIGNALS = ("r0", "r1", "r2")
@@ -2237,6 +2246,8 @@ def joined(program: dict[str, Any], names: set[str]) -> dict[str, Any]:
         made.append(["input", name] if name in names else operation)
     return {**program, "operations": made}
 
+
+# --- loop ---
 
 class Loop:
     """M_i z_i' = sum_j J_ij z_j + sum_k B_ik v_k + d_i + M_i φ*_j' around the operating point x*(t).
@@ -2700,6 +2711,48 @@ def _combined(left: Sequence[Sequence[Fraction]], right: Matrix, sign: int) -> M
     return [[a + sign * b for a, b in zip(*rows, strict=True)] for rows in zip(left, right, strict=True)]
 
 
+# --- lag ---
+
+class Lags:
+    """Gives a turn another state ζ for each lag: δ s_i acts as δ ζ would, added to z_i wherever that is read.
+
+    `followed` holds the place of each ζ among the states, the row that it follows, and the largest |δ| of that.
+    """
+
+    def __init__(self, turn: Any) -> None:
+        claim = turn.claim
+        self.rows, self.plain, count = claim.lags, len(claim.rows), len(claim.lags)
+        n, none = self.plain, [Fraction(0)] * count
+        turn.more = [1 + v for v in turn.change] + [Fraction(1)] * count
+        self.followed = [(n + k, i, turn.change[i]) for k, i in enumerate(claim.lags)]
+        for rows in (turn.a, turn.a_spread):
+            rows[:] = [[*row, *none] for row in rows]
+        for place, i, share in self.followed:
+            alone = all(turn.loop.entry(i, j) == ZERO for j in range(n) if j != i)
+            need(alone and turn.a[i][i] < 0, "a lag reads nothing but what it follows")
+            for j in range(n):
+                turn.a_spread[j][place] += up(abs(turn.a[j][i]) * share) if j != i else 0
+            own = [*turn.a[i][:n], *none]
+            own[place] = turn.a[i][i]
+            turn.a.append(own)
+            turn.a_spread.append([Fraction(0)] * (n + count))
+            turn.a_spread[-1][place] = up(abs(turn.a[i][i]) * share)
+            turn.b.append(list(turn.b[i]))
+            turn.b_spread.append([Fraction(0)] * turn.m)
+        for i in claim.lags:
+            turn.change[i] = Fraction(0)
+        turn.change += none
+        turn.push += none
+
+    def unread(self, rows: list[list[Interval]]) -> None:
+        """Refuse a controller that reads a lag."""
+        need(all(row[i] == ZERO for row in rows for i in self.rows), "a lag is not measured")
+
+    def spaced(self, row: list[Interval]) -> list[Interval]:
+        """A row over (z, …) with a place for the states of lags after z."""
+        return [*row[: self.plain], *[ZERO] * len(self.rows), *row[self.plain :]]
+
+
 # --- lead ---
 
 def sections(
@@ -2754,7 +2807,7 @@ class Turn:
         self.width = self.m + self.q + self.filters + self.w + self.kicked + self.n
         self.columns = self.order + self.width
         self._plant(cell, masses)
-        self._lags()
+        self.lags = Lags(self)
         self._controller()
         self._observer()
         self.jitter = Jitter(self) if claim.jitter > 0 else None
@@ -2788,31 +2841,6 @@ class Turn:
         pairs = zip(loop.demand_rate, claim.network_bound, strict=True)
         self.moving = [up(claim.period * r / bound) for r, bound in pairs]
 
-    def _lags(self) -> None:
-        """Another state ζ' = a_ii ζ + s_i for each lag: δ s_i acts as δ ζ would, added to z_i wherever that is read."""
-        claim, n, count = self.claim, len(self.claim.rows), len(self.claim.lags)
-        none = [Fraction(0)] * count
-        self.more = [1 + v for v in self.change] + [Fraction(1)] * count
-        self.lagging = [self.change[i] for i in claim.lags]
-        for rows in (self.a, self.a_spread):
-            rows[:] = [[*row, *none] for row in rows]
-        for k, i in enumerate(claim.lags):
-            alone = all(self.loop.entry(i, j) == ZERO for j in range(n) if j != i)
-            need(alone and self.a[i][i] < 0, "a lag reads nothing but what it follows")
-            for j in range(n):
-                self.a_spread[j][n + k] += up(abs(self.a[j][i]) * self.change[i]) if j != i else 0
-            own = [*self.a[i][:n], *none]
-            own[n + k] = self.a[i][i]
-            self.a.append(own)
-            self.a_spread.append([Fraction(0)] * (n + count))
-            self.a_spread[-1][n + k] = up(abs(self.a[i][i]) * self.change[i])
-            self.b.append(list(self.b[i]))
-            self.b_spread.append([Fraction(0)] * self.m)
-        for i in claim.lags:
-            self.change[i] = Fraction(0)
-        self.change += none
-        self.push += none
-
     def _controller(self) -> None:
         """The discrete part over (ẑ, c, w): middles and distances from them; how Z(0) follows from Q(0) and φ̂(0)."""
         claim, loop, n, q = self.claim, self.loop, len(self.claim.rows), self.q
@@ -2845,8 +2873,8 @@ class Turn:
         for j, i in enumerate(own):
             rate = mul(loop.gain[i].gamma, _point(claim.period / claim.network_bound[j]))
             learns.append([mul(mul(rate, v), _point(s)) for v, s in zip(error(i), scale, strict=True)])
-        need(all(row[i] == ZERO for row in (*acts, *learns, *smooths) for i in claim.lags), "a lag is not measured")
-        acts, learns, smooths = ([self._spaced(row) for row in part] for part in (acts, learns, smooths))
+        self.lags.unread([*acts, *learns, *smooths])
+        acts, learns, smooths = ([self.lags.spaced(row) for row in part] for part in (acts, learns, smooths))
         (self.act, self.act_spread), (self.learn, self.learn_spread) = split_of(acts), split_of(learns)
         self.smooth, self.smooth_spread = split_of(smooths)
         starts = []
@@ -2860,22 +2888,11 @@ class Turn:
             starts.append(
                 [mul(v, _point(s / claim.half_widths[i])) for v, s in zip(start, scale[: n + q], strict=True)]
             )
-        starts = [self._spaced(row) for row in starts] + [[ZERO] * (self.n + q) for _ in claim.lags]
+        starts = [self.lags.spaced(row) for row in starts] + [[ZERO] * (self.n + q) for _ in claim.lags]
         self.start, self.start_spread = split_of(starts)
         self.noise = [up(v / r) for v, r in zip(claim.noise, claim.half_widths, strict=True)]
         self.noise += [Fraction(0)] * len(claim.lags)
         self.blur = [up(loop.term_noise(row) / claim.input_bound[k]) for k, row in enumerate(claim.input_map)]
-
-    @property
-    def followed(self) -> list[tuple[int, int, Fraction]]:
-        """Place of each ζ among the states, the row that it follows, and the largest |δ| of that."""
-        n = len(self.claim.rows)
-        return [(n + k, i, share) for k, (i, share) in enumerate(zip(self.claim.lags, self.lagging, strict=True))]
-
-    def _spaced(self, row: list[Interval]) -> list[Interval]:
-        """A row over (z, …) with a place for the states of lags after z."""
-        n = len(self.claim.rows)
-        return [*row[:n], *[ZERO] * len(self.claim.lags), *row[n:]]
 
     def _observer(self) -> None:
         """What the controller sees of z, over the columns; what is bounded of an observer, and rounding of its gains.
@@ -3574,7 +3591,7 @@ class Bounded:
     def _joined(self, reached: list[Fraction]) -> list[Fraction]:
         """Bounds with z as it is, of bounds on y or on rates."""
         found = list(reached)
-        for place, i, share in self.turn.followed:
+        for place, i, share in self.turn.lags.followed:
             found[i] = up(found[i] + share * reached[place])
         return found
 
@@ -3606,7 +3623,7 @@ class Bounded:
             reads.append([*ahead[:-1], gain, *[Fraction(0)] * turn.turns])
         reads += [[*ahead, *row] for row in kicks]
         for row in reads:
-            for place, i, share in turn.followed:
+            for place, i, share in turn.lags.followed:
                 row[place] += share * row[i]
         return [[up(v) for v in row] for row in reads], [up(v) for v in known]
 

@@ -13,9 +13,9 @@ from pathlib import Path
 #: The parts in the order in which they stand; each uses those before it.
 ORDER = (
     "limits", "arithmetic", "forms", "fixed", "parsing", "shape", "grammar", "claim", "reference", "statement",
-    "structure", "course", "reading", "balance", "loop", "matrices", "jitter", "lead", "turn", "sums", "responses",
-    "obligation", "impulse", "golden", "effects", "obligations", "member", "motion", "coupling", "requirements",
-    "command",
+    "structure", "course", "reading", "balance", "targets", "loop", "matrices", "jitter", "lag", "lead", "turn", "sums",
+    "responses", "obligation", "impulse", "golden", "effects", "obligations", "member", "motion", "coupling",
+    "requirements", "command",
 )  # fmt: skip
 TARGET = Path(__file__).parent.parent / "checker.py"
 

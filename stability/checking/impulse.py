@@ -58,7 +58,7 @@ class Bounded:
     def _joined(self, reached: list[Fraction]) -> list[Fraction]:
         """Bounds with z as it is, of bounds on y or on rates."""
         found = list(reached)
-        for place, i, share in self.turn.followed:
+        for place, i, share in self.turn.lags.followed:
             found[i] = up(found[i] + share * reached[place])
         return found
 
@@ -90,7 +90,7 @@ class Bounded:
             reads.append([*ahead[:-1], gain, *[Fraction(0)] * turn.turns])
         reads += [[*ahead, *row] for row in kicks]
         for row in reads:
-            for place, i, share in turn.followed:
+            for place, i, share in turn.lags.followed:
                 row[place] += share * row[i]
         return [[up(v) for v in row] for row in reads], [up(v) for v in known]
 

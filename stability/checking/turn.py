@@ -10,8 +10,9 @@ from fractions import Fraction
 from .arithmetic import ZERO, Interval, add, down, mul, neg, up
 from .claim import Cell, Claim
 from .jitter import Jitter
+from .lag import Lags
 from .lead import sections
-from .limits import FIXED, ROUNDING, need
+from .limits import FIXED, ROUNDING
 from .loop import Loop
 from .matrices import Ball, Matrix, ball, dot, exponential_of, identity
 
@@ -46,7 +47,7 @@ class Turn:
         self.width = self.m + self.q + self.filters + self.w + self.kicked + self.n
         self.columns = self.order + self.width
         self._plant(cell, masses)
-        self._lags()
+        self.lags = Lags(self)
         self._controller()
         self._observer()
         self.jitter = Jitter(self) if claim.jitter > 0 else None
@@ -80,31 +81,6 @@ class Turn:
         pairs = zip(loop.demand_rate, claim.network_bound, strict=True)
         self.moving = [up(claim.period * r / bound) for r, bound in pairs]
 
-    def _lags(self) -> None:
-        """Another state ζ' = a_ii ζ + s_i for each lag: δ s_i acts as δ ζ would, added to z_i wherever that is read."""
-        claim, n, count = self.claim, len(self.claim.rows), len(self.claim.lags)
-        none = [Fraction(0)] * count
-        self.more = [1 + v for v in self.change] + [Fraction(1)] * count
-        self.lagging = [self.change[i] for i in claim.lags]
-        for rows in (self.a, self.a_spread):
-            rows[:] = [[*row, *none] for row in rows]
-        for k, i in enumerate(claim.lags):
-            alone = all(self.loop.entry(i, j) == ZERO for j in range(n) if j != i)
-            need(alone and self.a[i][i] < 0, "a lag reads nothing but what it follows")
-            for j in range(n):
-                self.a_spread[j][n + k] += up(abs(self.a[j][i]) * self.change[i]) if j != i else 0
-            own = [*self.a[i][:n], *none]
-            own[n + k] = self.a[i][i]
-            self.a.append(own)
-            self.a_spread.append([Fraction(0)] * (n + count))
-            self.a_spread[-1][n + k] = up(abs(self.a[i][i]) * self.change[i])
-            self.b.append(list(self.b[i]))
-            self.b_spread.append([Fraction(0)] * self.m)
-        for i in claim.lags:
-            self.change[i] = Fraction(0)
-        self.change += none
-        self.push += none
-
     def _controller(self) -> None:
         """The discrete part over (ẑ, c, w): middles and distances from them; how Z(0) follows from Q(0) and φ̂(0)."""
         claim, loop, n, q = self.claim, self.loop, len(self.claim.rows), self.q
@@ -137,8 +113,8 @@ class Turn:
         for j, i in enumerate(own):
             rate = mul(loop.gain[i].gamma, _point(claim.period / claim.network_bound[j]))
             learns.append([mul(mul(rate, v), _point(s)) for v, s in zip(error(i), scale, strict=True)])
-        need(all(row[i] == ZERO for row in (*acts, *learns, *smooths) for i in claim.lags), "a lag is not measured")
-        acts, learns, smooths = ([self._spaced(row) for row in part] for part in (acts, learns, smooths))
+        self.lags.unread([*acts, *learns, *smooths])
+        acts, learns, smooths = ([self.lags.spaced(row) for row in part] for part in (acts, learns, smooths))
         (self.act, self.act_spread), (self.learn, self.learn_spread) = split_of(acts), split_of(learns)
         self.smooth, self.smooth_spread = split_of(smooths)
         starts = []
@@ -152,22 +128,11 @@ class Turn:
             starts.append(
                 [mul(v, _point(s / claim.half_widths[i])) for v, s in zip(start, scale[: n + q], strict=True)]
             )
-        starts = [self._spaced(row) for row in starts] + [[ZERO] * (self.n + q) for _ in claim.lags]
+        starts = [self.lags.spaced(row) for row in starts] + [[ZERO] * (self.n + q) for _ in claim.lags]
         self.start, self.start_spread = split_of(starts)
         self.noise = [up(v / r) for v, r in zip(claim.noise, claim.half_widths, strict=True)]
         self.noise += [Fraction(0)] * len(claim.lags)
         self.blur = [up(loop.term_noise(row) / claim.input_bound[k]) for k, row in enumerate(claim.input_map)]
-
-    @property
-    def followed(self) -> list[tuple[int, int, Fraction]]:
-        """Place of each ζ among the states, the row that it follows, and the largest |δ| of that."""
-        n = len(self.claim.rows)
-        return [(n + k, i, share) for k, (i, share) in enumerate(zip(self.claim.lags, self.lagging, strict=True))]
-
-    def _spaced(self, row: list[Interval]) -> list[Interval]:
-        """A row over (z, …) with a place for the states of lags after z."""
-        n = len(self.claim.rows)
-        return [*row[:n], *[ZERO] * len(self.claim.lags), *row[n:]]
 
     def _observer(self) -> None:
         """What the controller sees of z, over the columns; what is bounded of an observer, and rounding of its gains.
