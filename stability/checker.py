@@ -94,8 +94,8 @@ jitter: An input that acts earlier or later than it should.
 
 lag: Rows that only follow what is commanded, with a time constant that is not known exactly.
 
-  Theorem: with M = M0/(1 + δ), δ constant, z' = (1 + δ) s + ..., and e = δ ζ, ζ' = a ζ + s, the rest z - e obeys the row
-  without δ s (docs/proof.md). Must fail: a row that reads anything else, that is measured, that does not contract.
+  Theorem: with M = M0/(1 + δ), δ constant, z' = (1 + δ) s + ..., and e = δ ζ, ζ' = a ζ + s, the rest z - e obeys the
+  row without δ s (docs/proof.md). Must fail: a row that reads anything else, that is measured, that does not contract.
 
 lead: Sections of lead between the error of an input's row and its proportional part.
 
@@ -1904,6 +1904,8 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     need(covered, "the cells do not cover the inertias and the constants that are cut")
     leads = index(model["leads"], MAX_LEADS + 1, "a number of leads") if "leads" in model else 0
     need(leads > 0 or "leads" not in model, "a model without leads does not name them")
+    tracked = {rows[i]["target"] for i in controlled} & set(input_map)
+    need(not (leads and tracked), "a row with leads is tracked by no row under the law")
     gains = gains_of(entry["gains"], controlled, input_map if leads else [], study, entry["name"])
     own = [states[i] for i, gain in zip(controlled, gains, strict=True) if gain[4] > 0]
     lags = [states.index(name) if name in states else -1 for name in certificate.get("lags", [])]
@@ -2527,6 +2529,9 @@ class Loop:
         left = magnitude(self._left(rest))
         # what stands beside a foreseen load is of others that move: at rest it is not there
         rested = magnitude(self._left(rest, dict.fromkeys((f"d:{name}" for name in claim.feedforward), ZERO)))
+        for j, other in enumerate(claim.rows):  # a mode may rest beside what it carries, as far as it may begin
+            if not other["controlled"] and not isinstance(other["target"], int):
+                rested += up(magnitude(self.closed[row].get(f"Q{j}", ZERO)) * claim.initial[j])
         self.demand.append(mul(level, inverse(drive)))
         self.met[i] = plus(met, middle), drive
         still = over(plus(met, middle), {**table.ranges, **self.resting})
@@ -2692,6 +2697,9 @@ class Jitter:
         self.grown, area = [row[:n] for row in grown], [row[n:] for row in grown]
         more = turn.more
         worse = [[turn.change[i] * size[i][j] + more[i] * turn.a_spread[i][j] for j in range(n)] for i in range(n)]
+        for place, i, share in turn.lags.followed:
+            for row, own, spread in zip(worse, more, turn.a_spread, strict=True):
+                row[place] += share * own * spread[i]
         driven = [[more[i] * (abs(v) + w) for v, w in zip(turn.b[i], turn.b_spread[i], strict=True)] for i in range(n)]
         grows = inverse_of(_combined(identity(n), _times(area, worse), -1))
         if min(v for row in grows for v in row) < 0:  # not the sum of a series
@@ -2728,7 +2736,7 @@ class Lags:
         for rows in (turn.a, turn.a_spread):
             rows[:] = [[*row, *none] for row in rows]
         for place, i, share in self.followed:
-            alone = all(turn.loop.entry(i, j) == ZERO for j in range(n) if j != i)
+            alone = all(turn.loop.entry(i, j) == ZERO and turn.a[i][j] == 0 for j in range(n) if j != i)
             need(alone and turn.a[i][i] < 0, "a lag reads nothing but what it follows")
             for j in range(n):
                 turn.a_spread[j][place] += up(abs(turn.a[j][i]) * share) if j != i else 0
@@ -3682,9 +3690,12 @@ class Impulse:
             WORK.one(
                 (rows * substeps * order * (len(claim.rows) + 1) + 8 * max(cell.groups) * order + 20 * order**3) // COST
             )
+        pieces = self._pieces()
+        # what φ* and b* are is told by middles of ranges: in every piece they are others
+        self.loops = [own for _, own in pieces]
         parts = [
             (part, own, list(masses))
-            for part, own in self._pieces()
+            for part, own in pieces
             for masses in product(*map(parts_of, own.mass, claim.split))
         ]
         cells = zip(claim.cells, parts, strict=True)
@@ -3713,10 +3724,11 @@ class Impulse:
         """Deviations, inputs, networks and demands stay inside the box in which the model was bounded."""
         claim, spare = self.claim, []
         for cell in self.cells:
-            spare += [1 - v for v in (*cell.whole[: cell.turn.n], *cell.inputs, *cell.missed)]
-        for found, taken in zip(self.loop.demand, claim.demand, strict=True):
-            size = max(abs(end) for end in taken) or Fraction(1)
-            spare += [(found[0] - taken[0]) / size, (taken[1] - found[1]) / size]
+            spare += [1 - v for v in (*cell.whole[: len(claim.rows)], *cell.inputs, *cell.missed)]
+        for loop in (self.loop, *self.loops):
+            for found, taken in zip(loop.demand, claim.demand, strict=True):
+                size = max(abs(end) for end in taken) or Fraction(1)
+                spare += [(found[0] - taken[0]) / size, (taken[1] - found[1]) / size]
         return min(spare)
 
     def estimates(self) -> list[Fraction]:
@@ -3750,12 +3762,13 @@ class Impulse:
 
     def largest(self, name: str) -> Fraction:
         """Bound on |input| as commanded, or on |state|: the start while the reference rests, what is left in motion."""
-        claim, loop = self.claim, self.loop
+        claim = self.claim
         whole = [*claim.half_widths, *claim.input_bound]
         if not claim.rest[1] > 0:
-            return loop.size(name, whole, resting=False)
+            return max(loop.size(name, whole, resting=False) for loop in self.loops)
         moving = self.sizes(claim.rest[1])
-        return max(loop.size(name, moving, resting=False), loop.size(name, whole, resting=True))
+        sizes = [(loop.size(name, moving, resting=False), loop.size(name, whole, resting=True)) for loop in self.loops]
+        return max(max(pair) for pair in sizes)
 
     def norm(self, signals: list[str]) -> Fraction:
         """Bound on the norm of inputs as commanded, or of states."""
@@ -4094,6 +4107,7 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     entry = data["members"][which]
     claim = read(data, entry, coupled)
     need(not (coupled and 0 in claim.networks), "a first row with a load network is of a member that nothing links")
+    need(not (coupled and claim.parts), "only a member that nothing links has constants that are cut")
     consistent(data, entry, claim)
     follows(data, entry, claim, which)
     well_formed(claim)
@@ -4511,7 +4525,16 @@ def _output(
     member: Member, program: dict[str, Any], reference: list[Interval], time: Fraction, followed: dict[int, Fraction]
 ) -> Interval:
     """Range of an output while the reference is in some ranges, from a time on; with bounds on some states."""
-    claim, loop = member.claim, member.loop
+    ranges = [_output_of(member, loop, program, reference, time, followed) for loop in member.verdict.loops]
+    return min(low for low, _ in ranges), max(high for _, high in ranges)
+
+
+def _output_of(
+    member: Member, loop: Loop, program: dict[str, Any], reference: list[Interval], time: Fraction,
+    followed: dict[int, Fraction],
+) -> Interval:  # fmt: skip
+    """The same for the constants of one loop."""
+    claim = member.claim
     known = {**loop.table.ranges, **{f"r{k}": bounds for k, bounds in enumerate(reference)}}
     for i, (met, drive) in loop.met.items():
         known[f"p{i}"] = mul(over(met, known), inverse(drive))
@@ -4555,7 +4578,12 @@ def _followed(member: Member, i: int) -> Fraction | None:
 
 def _begun(member: Member, i: int, target: int) -> Fraction:
     """Bound on a state at the start: its Q, and the control of its target there."""
-    claim, loop = member.claim, member.loop
+    return max(_begun_of(member, loop, i, target) for loop in member.verdict.loops)
+
+
+def _begun_of(member: Member, loop: Loop, i: int, target: int) -> Fraction:
+    """The same for the constants of one loop."""
+    claim = member.claim
     known = {**loop.table.ranges, **loop.resting}
     control = magnitude(over(loop.model[target], known)) + loop.half[target][1] * claim.initial[target]
     if target in claim.networks:

@@ -141,6 +141,7 @@ def claim_of(
             for g in gains
         ],
         split=list(found.partition.split),
+        leads=model.leads,
         parts=dict(found.partition.parts),
         lags=[next(i for i, row in enumerate(model.rows) if row.state == name) for name in found.lags],
         cells=[

@@ -50,7 +50,7 @@ class Cells:
         self.bounds, (self.box, self.rows) = bounds, first_box(model, bounds, gains, start)
         self.lags = self._lags() if model.rings else ()
         self.partition = self._partition(bounds, fine=fine) if partition is None else partition
-        self.middles = [_middle_of(rows) for rows in self._pieces(bounds, self.box, self.rows)]
+        self.middles = [_middle_of(rows) for rows in self.pieces(bounds, self.box, self.rows)]
         self.responses = self._responses(self.parts(bounds, self.box, self.rows), bounds)
 
     def _lags(self) -> tuple[int, ...]:
@@ -109,7 +109,7 @@ class Cells:
         noise = np.pad(bounds.noise, (0, len(self.lags)))
         return np.asarray(forced + plain.pulses @ push[n:] + plain.noise @ noise, dtype=np.float64)
 
-    def _pieces(self, bounds: Bounds, box: Box, rows: DeviationRows) -> list[DeviationRows]:
+    def pieces(self, bounds: Bounds, box: Box, rows: DeviationRows) -> list[DeviationRows]:
         """Enclosures of every combination of parts of the constants."""
         if not self.partition.parts:
             return [rows]
@@ -119,7 +119,7 @@ class Cells:
         """The cells; `rows` are the enclosures of all of them."""
         return [
             Part(cell, *middle)
-            for piece, middle in zip(self._pieces(bounds, box, rows), self.middles, strict=True)
+            for piece, middle in zip(self.pieces(bounds, box, rows), self.middles, strict=True)
             for cell in cells_of(piece, self.partition.split)
         ]
 

@@ -144,8 +144,11 @@ class Search(Cells):
                 return self._unstable(self.parts(bounds, box, taken)[summed.index(None)], bounds)
             known_rows = box is self.box and bounds is self.bounds
             rows = self.rows if known_rows else deviation_rows(self.model, bounds, self.gains, box)
-            if (larger := demanded(box, rows)) is not None:
-                box = larger
+            moved = [found for piece in (rows, *self.pieces(bounds, box, rows)) if (found := demanded(box, piece))]
+            if moved:
+                ends = [found.low for found in moved], [found.high for found in moved]
+                low, high = np.minimum.reduce([box.low, *ends[0]]), np.maximum.reduce([box.high, *ends[1]])
+                box = replace(box, low=low, high=high)
                 continue
             parts, control = self.parts(bounds, box, rows), controller(self.model, self.gains, rows, bounds.period)
             found = [self._cell(part.rows, r, control, bounds, box) for part, r in zip(parts, known, strict=True)]
@@ -233,11 +236,13 @@ class Search(Cells):
         solved = [self._shrinking(r, s, bounds) for r, s in zip(known, solved, strict=True)]
         settled = _after(solved, periods_in(bounds.transient, bounds.period))
         whole = np.concatenate([box.half_widths, box.input_bound])
-        sizes = rows.sizes(whole, resting=False)
+        pieces = self.pieces(bounds, box, rows)
+        sizes = np.max([own.sizes(whole, resting=False) for own in pieces], axis=0)
         if bounds.rest[1] > 0:  # what a start makes of the loop has shrunk when the motion begins
             late = _after(solved, periods_in(bounds.rest[1], bounds.period))
             moving = np.minimum(whole, np.concatenate([late[:n], late[2 * n : 2 * n + m] + late_of(rows, bounds)]))
-            sizes = np.maximum(rows.sizes(moving, resting=False), rows.sizes(whole, resting=True))
+            ways = [(own.sizes(moving, resting=False), own.sizes(whole, resting=True)) for own in pieces]
+            sizes = np.max([size for pair in ways for size in pair], axis=0)
         decay = min(math.log(s.growth) for s in solved) / bounds.period
         return Impulse(
             decay=decay, half_widths=box.half_widths, input_bound=box.input_bound, ultimate=settled[:n],

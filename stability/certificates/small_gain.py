@@ -114,6 +114,7 @@ def small_gain(rows: DeviationRows, stack: Stack, ctl: Controller, bounds: Bound
     kicks, sudden, changed = np.zeros((stack.kicked, m)), np.zeros((n, m)), bounds.period * rows.drift
     if stack.kicked:  # of the input and, as long as it lasts, of what the uncertainty makes of that and of the kick
         area, worse = stack.meanwhile()[1], change[:, None] * np.abs(stack.a) + more * spread
+        worse[:, n - more_states :] += more * spread[:, own] * lagging
         driven = more * (np.abs(stack.b) + loose)
         kicks = np.linalg.solve(np.eye(n) - area @ worse, area @ driven)
         sudden = np.asarray(driven + (worse + np.abs(stack.a)) @ kicks, dtype=np.float64)

@@ -149,9 +149,12 @@ class Impulse:
             WORK.one(
                 (rows * substeps * order * (len(claim.rows) + 1) + 8 * max(cell.groups) * order + 20 * order**3) // COST
             )
+        pieces = self._pieces()
+        # what φ* and b* are is told by middles of ranges: in every piece they are others
+        self.loops = [own for _, own in pieces]
         parts = [
             (part, own, list(masses))
-            for part, own in self._pieces()
+            for part, own in pieces
             for masses in product(*map(parts_of, own.mass, claim.split))
         ]
         cells = zip(claim.cells, parts, strict=True)
@@ -180,10 +183,11 @@ class Impulse:
         """Deviations, inputs, networks and demands stay inside the box in which the model was bounded."""
         claim, spare = self.claim, []
         for cell in self.cells:
-            spare += [1 - v for v in (*cell.whole[: cell.turn.n], *cell.inputs, *cell.missed)]
-        for found, taken in zip(self.loop.demand, claim.demand, strict=True):
-            size = max(abs(end) for end in taken) or Fraction(1)
-            spare += [(found[0] - taken[0]) / size, (taken[1] - found[1]) / size]
+            spare += [1 - v for v in (*cell.whole[: len(claim.rows)], *cell.inputs, *cell.missed)]
+        for loop in (self.loop, *self.loops):
+            for found, taken in zip(loop.demand, claim.demand, strict=True):
+                size = max(abs(end) for end in taken) or Fraction(1)
+                spare += [(found[0] - taken[0]) / size, (taken[1] - found[1]) / size]
         return min(spare)
 
     def estimates(self) -> list[Fraction]:
@@ -217,12 +221,13 @@ class Impulse:
 
     def largest(self, name: str) -> Fraction:
         """Bound on |input| as commanded, or on |state|: the start while the reference rests, what is left in motion."""
-        claim, loop = self.claim, self.loop
+        claim = self.claim
         whole = [*claim.half_widths, *claim.input_bound]
         if not claim.rest[1] > 0:
-            return loop.size(name, whole, resting=False)
+            return max(loop.size(name, whole, resting=False) for loop in self.loops)
         moving = self.sizes(claim.rest[1])
-        return max(loop.size(name, moving, resting=False), loop.size(name, whole, resting=True))
+        sizes = [(loop.size(name, moving, resting=False), loop.size(name, whole, resting=True)) for loop in self.loops]
+        return max(max(pair) for pair in sizes)
 
     def norm(self, signals: list[str]) -> Fraction:
         """Bound on the norm of inputs as commanded, or of states."""

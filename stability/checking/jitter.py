@@ -31,6 +31,9 @@ class Jitter:
         self.grown, area = [row[:n] for row in grown], [row[n:] for row in grown]
         more = turn.more
         worse = [[turn.change[i] * size[i][j] + more[i] * turn.a_spread[i][j] for j in range(n)] for i in range(n)]
+        for place, i, share in turn.lags.followed:
+            for row, own, spread in zip(worse, more, turn.a_spread, strict=True):
+                row[place] += share * own * spread[i]
         driven = [[more[i] * (abs(v) + w) for v, w in zip(turn.b[i], turn.b_spread[i], strict=True)] for i in range(n)]
         grows = inverse_of(_combined(identity(n), _times(area, worse), -1))
         if min(v for row in grows for v in row) < 0:  # not the sum of a series

@@ -1,7 +1,7 @@
 """Rows that only follow what is commanded, with a time constant that is not known exactly.
 
-Theorem: with M = M0/(1 + δ), δ constant, z' = (1 + δ) s + ..., and e = δ ζ, ζ' = a ζ + s, the rest z - e obeys the row
-without δ s (docs/proof.md). Must fail: a row that reads anything else, that is measured, that does not contract.
+Theorem: with M = M0/(1 + δ), δ constant, z' = (1 + δ) s + ..., and e = δ ζ, ζ' = a ζ + s, the rest z - e obeys the
+row without δ s (docs/proof.md). Must fail: a row that reads anything else, that is measured, that does not contract.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Lags:
         for rows in (turn.a, turn.a_spread):
             rows[:] = [[*row, *none] for row in rows]
         for place, i, share in self.followed:
-            alone = all(turn.loop.entry(i, j) == ZERO for j in range(n) if j != i)
+            alone = all(turn.loop.entry(i, j) == ZERO and turn.a[i][j] == 0 for j in range(n) if j != i)
             need(alone and turn.a[i][i] < 0, "a lag reads nothing but what it follows")
             for j in range(n):
                 turn.a_spread[j][place] += up(abs(turn.a[j][i]) * share) if j != i else 0

@@ -295,6 +295,9 @@ class Loop:
         left = magnitude(self._left(rest))
         # what stands beside a foreseen load is of others that move: at rest it is not there
         rested = magnitude(self._left(rest, dict.fromkeys((f"d:{name}" for name in claim.feedforward), ZERO)))
+        for j, other in enumerate(claim.rows):  # a mode may rest beside what it carries, as far as it may begin
+            if not other["controlled"] and not isinstance(other["target"], int):
+                rested += up(magnitude(self.closed[row].get(f"Q{j}", ZERO)) * claim.initial[j])
         self.demand.append(mul(level, inverse(drive)))
         self.met[i] = plus(met, middle), drive
         still = over(plus(met, middle), {**table.ranges, **self.resting})

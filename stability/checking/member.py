@@ -42,6 +42,7 @@ def check_member(data: dict[str, Any], which: int, coupled: bool) -> Member:
     entry = data["members"][which]
     claim = read(data, entry, coupled)
     need(not (coupled and 0 in claim.networks), "a first row with a load network is of a member that nothing links")
+    need(not (coupled and claim.parts), "only a member that nothing links has constants that are cut")
     consistent(data, entry, claim)
     follows(data, entry, claim, which)
     well_formed(claim)

@@ -73,6 +73,8 @@ def _read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
     need(covered, "the cells do not cover the inertias and the constants that are cut")
     leads = index(model["leads"], MAX_LEADS + 1, "a number of leads") if "leads" in model else 0
     need(leads > 0 or "leads" not in model, "a model without leads does not name them")
+    tracked = {rows[i]["target"] for i in controlled} & set(input_map)
+    need(not (leads and tracked), "a row with leads is tracked by no row under the law")
     gains = gains_of(entry["gains"], controlled, input_map if leads else [], study, entry["name"])
     own = [states[i] for i, gain in zip(controlled, gains, strict=True) if gain[4] > 0]
     lags = [states.index(name) if name in states else -1 for name in certificate.get("lags", [])]

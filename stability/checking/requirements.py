@@ -16,6 +16,7 @@ from .arithmetic import ONE, ZERO, Interval, add, intersect, inverse, magnitude,
 from .coupling import Coupling
 from .forms import Node, Table, derivative, linear, over
 from .limits import need
+from .loop import Loop
 from .member import Member
 from .parsing import number, numbers, reads, valid_program
 from .reference import ranges_on
@@ -131,7 +132,16 @@ def _output(
     member: Member, program: dict[str, Any], reference: list[Interval], time: Fraction, followed: dict[int, Fraction]
 ) -> Interval:
     """Range of an output while the reference is in some ranges, from a time on; with bounds on some states."""
-    claim, loop = member.claim, member.loop
+    ranges = [_output_of(member, loop, program, reference, time, followed) for loop in member.verdict.loops]
+    return min(low for low, _ in ranges), max(high for _, high in ranges)
+
+
+def _output_of(
+    member: Member, loop: Loop, program: dict[str, Any], reference: list[Interval], time: Fraction,
+    followed: dict[int, Fraction],
+) -> Interval:  # fmt: skip
+    """The same for the constants of one loop."""
+    claim = member.claim
     known = {**loop.table.ranges, **{f"r{k}": bounds for k, bounds in enumerate(reference)}}
     for i, (met, drive) in loop.met.items():
         known[f"p{i}"] = mul(over(met, known), inverse(drive))
@@ -175,7 +185,12 @@ def _followed(member: Member, i: int) -> Fraction | None:
 
 def _begun(member: Member, i: int, target: int) -> Fraction:
     """Bound on a state at the start: its Q, and the control of its target there."""
-    claim, loop = member.claim, member.loop
+    return max(_begun_of(member, loop, i, target) for loop in member.verdict.loops)
+
+
+def _begun_of(member: Member, loop: Loop, i: int, target: int) -> Fraction:
+    """The same for the constants of one loop."""
+    claim = member.claim
     known = {**loop.table.ranges, **loop.resting}
     control = magnitude(over(loop.model[target], known)) + loop.half[target][1] * claim.initial[target]
     if target in claim.networks:

@@ -113,6 +113,8 @@ def deviation_rows(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], b
     """
     tracked = {row.target for row in model.rows if isinstance(row.target, int)}
     states = {row.state for row in model.rows}
+    if model.leads and {row.target for row in model.rows if row.controlled} & set(model.input_map):
+        raise UnboundedError("a row with leads is tracked by no row under the law")
     for row, term in zip(model.controlled, model.law, strict=True):
         if row in tracked and states & set(term.inputs):
             raise UnboundedError(f"the modelling term of row {row + 1} reads a state; a certificate needs it free")
@@ -231,10 +233,13 @@ class _Builder(Builder):
         still = over(met + middle, {**self.symbols.ranges, **self._resting()})
         # what stands beside a foreseen load is of others that move: at rest it is not there
         alone = dict.fromkeys((f"d:{name}" for name in self.bounds.feedforward), Interval(0.0))
-        rested = over(Form(kept, rest.constant), {**self.symbols.ranges, **alone})
+        rested = over(Form(kept, rest.constant), {**self.symbols.ranges, **alone}).magnitude
+        for j, other in enumerate(self.model.rows):  # a mode may rest beside what it carries, as far as it may begin
+            if not other.controlled and not isinstance(other.target, int):
+                rested += row.coefficient(f"Q{j}").magnitude * self.bounds.initial[j] * (1 + 1e-12)
         return _Demand(
             range=level / drive, rate=change / drive.low * (1 + 1e-12), rest=left.magnitude,
-            lean=(left.low + left.high) / 2, settled=rested.magnitude / least, resting=still / drive,
+            lean=(left.low + left.high) / 2, settled=rested / least, resting=still / drive,
         )  # fmt: skip
 
     def _carried(self, i: int, raw: Form, mass: Interval) -> float:

@@ -3,6 +3,7 @@
 import json
 import math
 import tomllib
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -11,11 +12,13 @@ import casadi as ca
 import numpy as np
 import pytest
 from forging import forged
+from known_answers import claim_of, verdict
 from machines import study_from
 from scipy.integrate import solve_ivp
 
 from hdmm_opt.control.law import step_function
 from hdmm_opt.jobs.contributions import contributions
+from hdmm_opt.plants.hydraulic_wheel import defaults
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop, Run, Scenario
 from hdmm_opt.study.read import bundled_text
@@ -171,6 +174,27 @@ def test_cells_and_lags_tighten_the_bound(problem, values):
     assert isinstance(plain, Failure) or plain.ultimate[0] > 1.1 * found[0].ultimate[0]
 
 
+def test_parts_are_decided_by_the_checker(values):
+    """Leakage in three parts, all else known: each part has its own middle, demand and place, and no other's."""
+    data = tomllib.loads(bundled_text("wheel-p2"))
+    for name, p in defaults("flow").items():
+        if p.tolerance:
+            spread = 0.5 if name == "leakage" else 0.0
+            entry = {"value": p.value, "unit": p.unit, "tolerance": spread, "source": "assumed"}
+            data["plant"]["parameters"][name] = entry
+    (member,) = assemble(study_from(data)).members
+    own, cut = member.gains(values), Partition((1, 1, 1), {"leakage": 3})
+    found = Search(member.model, member.bounds, own, member.box, partition=cut).run(member.bounds)
+    assert not isinstance(found, Failure), found.reason
+    claim = claim_of(member.model, member.bounds, own, found, limit=1e30, accuracy=1e30)
+    claim = replace(claim, first="speed")
+    assert verdict(claim)
+    assert not verdict(replace(claim, cells=claim.cells[::-1]))
+    assert not verdict(replace(claim, cells=[claim.cells[0]] * 3))
+    (low, high), rest = claim.demand[0], claim.demand[1:]
+    assert not verdict(replace(claim, demand=[(low, high - (high - low) / 50), *rest]))
+
+
 def test_each_part_of_the_law_is_needed(problem, values):
     """Nothing is proved without the network, the flow's feedforward or the leads."""
     (member,) = problem.members
@@ -230,6 +254,7 @@ CHANGES = {
     "the law's row in balance": lambda data: own(data)["model"]["rows"][0].update(target="balance"),
     "a lag in balance": lambda data: own(data)["model"]["rows"][1].update(target="balance"),
     "a slower valve": tolerance("valve_lag", 0.2),
+    "a lag that reads the pressure": lambda data: own(data)["certificate"]["force"][1].__setitem__(2, "1/1000000"),
     "softer oil": tolerance("bulk_modulus", 0.1),
 }  # fmt: skip
 
