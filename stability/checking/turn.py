@@ -47,6 +47,7 @@ class Turn:
         self.width = self.m + self.q + self.filters + self.w + self.kicked + self.n
         self.columns = self.order + self.width
         self._plant(cell, masses)
+        self.more: list[Fraction] = []
         self.lags = Lags(self)
         self._controller()
         self._observer()

@@ -113,7 +113,7 @@ def deviation_rows(model: LoopModel, bounds: Bounds, gains: tuple[Gains, ...], b
     """
     tracked = {row.target for row in model.rows if isinstance(row.target, int)}
     states = {row.state for row in model.rows}
-    if model.leads and {row.target for row in model.rows if row.controlled} & set(model.input_map):
+    if model.leads and any(row.controlled and row.target in model.input_map for row in model.rows):
         raise UnboundedError("a row with leads is tracked by no row under the law")
     for row, term in zip(model.controlled, model.law, strict=True):
         if row in tracked and states & set(term.inputs):
