@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from stability.checker import NAME, UNIT_TEXT
+from stability.checker import MAX_LEADS, NAME, UNIT_TEXT
 from stability.enclosures.expression import Expression
 from stability.loops.model import BALANCE, CONSTANT, SIGNALS
 
@@ -162,6 +162,10 @@ def _check_rows(plant: Plant) -> None:
     for row in plant.input_map:
         if not (0 <= row < len(plant.states) and plant.controlled[row]):
             raise _wrong(f"input_map names controlled rows: got {row}", "correct it")
+    if not (isinstance(plant.leads, int) and 0 <= plant.leads <= MAX_LEADS):
+        raise _wrong(f"leads is a number of sections, 0 to {MAX_LEADS}: got {plant.leads!r:.20}", "correct it")
+    if plant.leads and any(plant.controlled[i] and t in plant.input_map for i, t in enumerate(plant.targets)):
+        raise _wrong("a row with leads is tracked by no row under the law", "set leads to 0")
     driven = {target for target in plant.targets if isinstance(target, int)} | set(plant.input_map)
     for i, controlled in enumerate(plant.controlled):
         if controlled and i not in driven:

@@ -17,15 +17,20 @@ from machines import study_from
 from scipy.integrate import solve_ivp
 
 from hdmm_opt.control.law import step_function
+from hdmm_opt.control.rac import RAC
+from hdmm_opt.errors import InvalidInputError
 from hdmm_opt.jobs.contributions import contributions
 from hdmm_opt.plants.hydraulic_wheel import defaults
+from hdmm_opt.plants.registry import plant_model
+from hdmm_opt.plants.sound import check_plant
 from hdmm_opt.problem import assemble
 from hdmm_opt.simulation import Loop, Run, Scenario
 from hdmm_opt.study.read import bundled_text
 from stability import Failure, Interval, checker
 from stability.certificates.cut import Partition, parts_of, shared
 from stability.certificates.impulse import Search
-from stability.loops.deviation import first_box
+from stability.loops.box import UnboundedError
+from stability.loops.deviation import deviation_rows, first_box
 
 FILE = Path(__file__).parent.parent.parent / "notebooks" / "gains" / "wheel-p2.gains.json"
 
@@ -202,6 +207,19 @@ def test_each_part_of_the_law_is_needed(problem, values):
     assert whole.certified is not None
     assert {c.part for c in without} == {"phi", "flow", "lead"}
     assert all(c.certified is None or c.certified > 1.2 * whole.certified for c in without)
+
+
+def test_a_row_with_leads_is_tracked_by_no_row_under_the_law(problem):
+    """Its virtual control would be another one than the prover takes."""
+    (member,) = problem.members
+    chain = plant_model("hydraulic_wheel").build("flow", {}, {}, sensor="pressure")
+    for leads, said in ((5, "0 to 4"), (-1, "0 to 4")):
+        with pytest.raises(InvalidInputError, match=said):
+            check_plant(replace(chain, leads=leads))
+    model = replace(RAC(plant=chain).loop_model(), leads=2, input_map=(0,))
+    with pytest.raises(UnboundedError, match="a row with leads is tracked by no row under the law"):
+        deviation_rows(model, member.bounds, (), first_box(member.model, member.bounds, member.gains(tuple(
+            item.low for item in member.ranges)), np.array([1e-6, 1e-6, 1.0]))[0])  # fmt: skip
 
 
 def own(data):
