@@ -12,7 +12,7 @@ from ..loops.deviation import NOTHING, deviation_rows, first_box, networks, roun
 from ..loops.model import Bounds, Gains, LoopModel
 from ..loops.responses import Responses, responses
 from ..loops.stack import Stack, controller, delay_of, wiring, with_lags
-from .cut import RINGING, Partition, cells_of, constants_of, cut_for, middles, shared
+from .cut import LED, RINGING, Partition, cells_of, constants_of, cut_for, middles, ringing_of, shared
 from .small_gain import Uncertain, middle_of, small_gain
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ class Cells:
         self.steering, self.direct = wiring(model, self.own)
         start = rounded(np.maximum(np.array(bounds.initial), NOTHING * limit))
         self.bounds, (self.box, self.rows) = bounds, first_box(model, bounds, gains, start)
-        self.lags = self._lags() if model.rings else ()
+        self.lags = self._lags() if model.rings and model.leads else ()
         self.partition = self._partition(bounds, fine=fine) if partition is None else partition
         self.middles = [_middle_of(rows) for rows in self.pieces(bounds, self.box, self.rows)]
         self.responses = self._responses(self.parts(bounds, self.box, self.rows), bounds)
@@ -64,18 +64,20 @@ class Cells:
         return tuple(found)
 
     def _partition(self, bounds: Bounds, *, fine: bool) -> Partition:
-        """How ranges are cut: where a mode is left to itself, as what each leaves uncertain costs."""
+        """How ranges are cut: with leads by what each leaves uncertain costs, else those of inertias by their widths."""
         whole = (1,) * len(self.model.rows)
         if not self.model.rings:
             return Partition(cut_for(len(self.model.rows), fine=fine).of(self.rows), {})
         (known,) = self._responses([Part(self.rows, *_middle_of(self.rows))], bounds)
+        if not self.model.leads:
+            return Partition(RINGING[fine].of(self.rows, 1.0 if known is None else ringing_of(known)), {})
         if known is None:
             return Partition(whole, {})
         inertias = [
             i for i, (low, high) in enumerate(zip(self.rows.mass_low, self.rows.mass_high, strict=True)) if low < high
         ]
         constants = constants_of(self.model, bounds)
-        counts = shared(self._costs(known, bounds, inertias, constants), RINGING[fine])
+        counts = shared(self._costs(known, bounds, inertias, constants), LED[fine])
         split = dict(zip(inertias, counts, strict=False))
         parts = zip(constants, counts[len(inertias) :], strict=True)
         return Partition(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..enclosures.interval import Interval
 from ..loops.box import DeviationRows
 from ..loops.model import Bounds, LoopModel
+from ..loops.responses import Responses
 from ..loops.rows import VARYING
 
 Array = NDArray[np.float64]
@@ -40,9 +41,9 @@ class Cut:
     cells: int
     more: int
 
-    def of(self, rows: DeviationRows) -> tuple[int, ...]:
-        """Number of parts of each range. Shape (n,)."""
-        wide = np.log(rows.mass_high / rows.mass_low) / 2
+    def of(self, rows: DeviationRows, ringing: Array | float = 1.0) -> tuple[int, ...]:
+        """Number of parts of each range, where what a part leaves uncertain counts `ringing` times. Shape (n,)."""
+        wide = np.log(rows.mass_high / rows.mass_low) / 2 * ringing
         counts = np.clip(np.ceil(wide / self.width), 1, self.most)
         while counts.prod() > self.cells:
             after = np.where(counts > 1, wide / np.maximum(counts - 1, 1), np.inf)
@@ -54,8 +55,12 @@ class Cut:
 
 #: For candidates of a search; for a certificate that is refined, and with more rows, of which the checker takes less.
 COARSE, FINE, FEWER, MANY = Cut(0.1, 4, 4, 4), Cut(0.008, 12, 12, 24), Cut(0.008, 12, 8, 8), 4
-#: Cells of a loop with a mode that the law leaves to itself: of candidates, and of a certificate that is refined.
-RINGING = 6, 9
+#: The same of a loop with a mode that the law leaves to itself.
+RINGING = Cut(0.1, 8, 8, 8), Cut(0.008, 10, 10, 10)
+#: Cells of one with leads, where other constants than inertias are cut too and the checker takes longer for a cell.
+LED = 6, 9
+#: What a push makes of the rate of its own row in a loop that does not ring, over the push, is at most this.
+CALM = 2.5
 #: A range whose spread costs less than this share of the bound is not cut.
 FELT = 0.002
 
@@ -65,6 +70,12 @@ def cut_for(rows: int, *, fine: bool) -> Cut:
     if not fine:
         return COARSE
     return FEWER if rows > MANY else FINE
+
+
+def ringing_of(whole: Responses) -> Array:
+    """How much longer each row's rate answers to a push of its own than in a loop that does not ring. Shape (n,)."""
+    n = whole.stack.sizes[0]
+    return np.asarray(np.maximum(1.0, np.diag(whole.plain.rest[n : 2 * n]) / CALM), dtype=np.float64)
 
 
 @dataclass(frozen=True)

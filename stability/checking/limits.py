@@ -40,7 +40,7 @@ LEAST_LOAD = Fraction(1, 10**4)
 #: A member moves the output by at least this much per unit of its position, m/m or m/rad.
 LEAST_SLOPE = 0.05
 #: Interval products that all members and the coupling of a machine may take; files of ours take up to half.
-MAX_PRODUCTS, MAX_COUPLED = 200_000, 4_500_000
+MAX_PRODUCTS, MAX_COUPLED = 200_000, 4_000_000
 #: Members of a machine, and slices of time that its motion may be cut into.
 MAX_MEMBERS, MAX_SLICES = 8, 1_000
 #: Names of the parameter that holds a member's own part of the bodies' inertia.
