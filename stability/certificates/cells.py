@@ -64,7 +64,7 @@ class Cells:
         return tuple(found)
 
     def _partition(self, bounds: Bounds, *, fine: bool) -> Partition:
-        """How ranges are cut: with leads by what each leaves uncertain costs, else those of inertias by their widths."""
+        """How ranges are cut: with leads by what each leaves uncertain costs, else of inertias by their widths."""
         whole = (1,) * len(self.model.rows)
         if not self.model.rings:
             return Partition(cut_for(len(self.model.rows), fine=fine).of(self.rows), {})
