@@ -2046,9 +2046,9 @@ def gains_of(
     kinds = ("beta", "epsilon", "delta", "sigma", "gamma", "phi", "preload")
     given = {entry["name"]: number(entry["value"], entry["name"]) for entry in entries}
     names = [f"{kind}_{k + 1}" for k in range(len(controlled)) for kind in kinds]
-    names += [f"{kind}_{k + 1}" for k, row in enumerate(controlled) if row in led for kind in ("lead", "smooth")]
+    names += [f"{kind}_{k + 1}" for k, row in enumerate(controlled) if row in led for kind in TIMES]
     need(set(given) == set(names) and len(entries) == len(names), "the gains do not fit the subsystems")
-    gains = [tuple(given.get(f"{kind}_{k + 1}", Fraction(0)) for kind in (*kinds, "lead", "smooth"))
+    gains = [tuple(given.get(f"{kind}_{k + 1}", Fraction(0)) for kind in (*kinds, *TIMES))
              for k in range(len(controlled))]  # fmt: skip
     good = all(b > 0 and e >= 0 and d > 0 and s > 0 and g >= 0 and phi >= abs(p) * (g > 0) >= 0 <= min(times)
                for b, e, d, s, g, phi, p, *times in gains)  # fmt: skip
@@ -2894,9 +2894,7 @@ class Turn:
                 start[target] = mul(neg(loop.gain[target].beta), _point(Fraction(1, 2)))
                 if target in own:
                     start[n + own.index(target)] = _point(Fraction(-1))
-            starts.append(
-                [mul(v, _point(s / claim.half_widths[i])) for v, s in zip(start, scale[: n + q], strict=True)]
-            )
+            starts.append(_in_units(start, scale[: n + q], claim.half_widths[i]))
         starts = [self.lags.spaced(row) for row in starts] + [[ZERO] * (self.n + q) for _ in claim.lags]
         self.start, self.start_spread = split_of(starts)
         self.noise = [up(v / r) for v, r in zip(claim.noise, claim.half_widths, strict=True)]

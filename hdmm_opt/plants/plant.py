@@ -195,6 +195,12 @@ class Plant:
                 found[i] = float(ca.evalf(self.balanced(i, ca.DM(r), ca.DM(list(loads)), ca.DM(list(values.values())))))
         return found
 
+    def readers(self, i: int) -> list[int]:
+        """The other rows that read the state of row i."""
+        import casadi as ca
+
+        return [j for j in range(len(self.states)) if j != i and ca.depends_on(self.force[j], self.x[i])]
+
     def balanced(self, i: int, r: Any, w: Any, p: Any) -> Any:
         """The state of row i with which the only other row that reads it moves as is asked for, as an expression.
 
@@ -208,7 +214,7 @@ class Plant:
         """
         import casadi as ca
 
-        k = next(j for j in range(len(self.states)) if j != i and ca.depends_on(self.force[j], self.x[i]))
+        k = self.readers(i)[0]
         missing = self.force[k] - self.mass[k] * (r[1] if k == 0 else 0)
         x = ca.vertcat(*(r[0] if j == 0 else 0 for j in range(len(self.states))))
         step = -missing / ca.jacobian(missing, self.x[i])

@@ -134,8 +134,6 @@ def _check_operations(plant: Plant) -> None:
 
 
 def _check_rows(plant: Plant) -> None:
-    import casadi as ca
-
     if plant.targets[0] != "reference" or not plant.controlled[0]:
         raise _wrong("the first row must track the reference under the law", 'start targets with "reference"')
     for i, target in enumerate(plant.targets):
@@ -148,7 +146,7 @@ def _check_rows(plant: Plant) -> None:
                 rule = f"target {i + 1} is of a row without law, and made of {parts}: got {other!r:.40}"
                 raise _wrong(rule, "correct it")
         elif target == BALANCE:
-            reading = [j for j in range(len(plant.states)) if j != i and ca.depends_on(plant.force[j], plant.x[i])]
+            reading = plant.readers(i)
             if plant.controlled[i] or len(reading) != 1 or plant.targets[reading[0]] != "reference":
                 rule = (
                     f'target {i + 1}, "balance", is of a row without law whose state one other row reads, which tracks'

@@ -51,7 +51,7 @@ def budget_of(search: Search, bounds: Bounds, found: Impulse) -> Budget:
     """
     rows = deviation_rows(search.model, bounds, search.gains, found.box)
     control, cells = controller(search.model, search.gains, rows, bounds.period), []
-    for part, known in zip(search.parts(bounds, found.box, rows), search.responses, strict=True):
+    for part, known in zip(search.parts(search.pieces(bounds, found.box, rows)), search.responses, strict=True):
         assert known is not None
         uncertain = small_gain(part.rows, known.stack, control, bounds)
         reads, push = uncertain.reads, uncertain.push

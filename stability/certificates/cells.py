@@ -50,8 +50,9 @@ class Cells:
         self.bounds, (self.box, self.rows) = bounds, first_box(model, bounds, gains, start)
         self.lags = self._lags() if model.rings and model.leads else ()
         self.partition = self._partition(bounds, fine=fine) if partition is None else partition
-        self.middles = [_middle_of(rows) for rows in self.pieces(bounds, self.box, self.rows)]
-        self.responses = self._responses(self.parts(bounds, self.box, self.rows), bounds)
+        pieces = self.pieces(bounds, self.box, self.rows)
+        self.middles = [_middle_of(rows) for rows in pieces]
+        self.responses = self._responses(self.parts(pieces), bounds)
 
     def _lags(self) -> tuple[int, ...]:
         """Rows that do nothing but to follow what is commanded, with a time constant that is not known exactly."""
@@ -88,18 +89,20 @@ class Cells:
         """What the spread of each alone adds to the bound on z_1, to first order, as a share of it."""
         stack, mass = known.stack, middle_of(self.rows)
 
-        def uncertain(still: Bounds, loose: int = -1) -> tuple[Uncertain, DeviationRows]:
-            rows = deviation_rows(self.model, still, self.gains, self.box)
+        def enclosed(name: str = "") -> DeviationRows:
+            return deviation_rows(self.model, middles(bounds, name), self.gains, self.box)
+
+        def uncertain(rows: DeviationRows, loose: int = -1) -> Uncertain:
             low, high = mass.copy(), mass.copy()
             if loose >= 0:
                 low[loose], high[loose] = self.rows.mass_low[loose], self.rows.mass_high[loose]
             rows = replace(rows, mass_low=low, mass_high=high)
-            return small_gain(rows, stack, controller(self.model, self.gains, rows, bounds.period), still), rows
+            return small_gain(rows, stack, controller(self.model, self.gains, rows, bounds.period), bounds)
 
-        still = middles(bounds)
-        least, rows = uncertain(still)
+        rows = enclosed()
+        least = uncertain(rows)
         reached = self.forced(known, least, rows, bounds)
-        found = [uncertain(still, i)[0] for i in inertias] + [uncertain(middles(bounds, name))[0] for name in constants]
+        found = [uncertain(rows, i) for i in inertias] + [uncertain(enclosed(name)) for name in constants]
         n, plain = stack.sizes[0], known.plain
         way = np.concatenate([plain.rest[0, :n], plain.pulses[0]])
         return [float(way @ ((u.reads - least.reads) @ reached + u.push - least.push) / reached[0]) for u in found]
@@ -112,16 +115,16 @@ class Cells:
         return np.asarray(forced + plain.pulses @ push[n:] + plain.noise @ noise, dtype=np.float64)
 
     def pieces(self, bounds: Bounds, box: Box, rows: DeviationRows) -> list[DeviationRows]:
-        """Enclosures of every combination of parts of the constants."""
+        """Enclosures of every combination of parts of the constants; `rows` are those of all of them."""
         if not self.partition.parts:
             return [rows]
         return [deviation_rows(self.model, own, self.gains, box) for own in self.partition.pieces(bounds)]
 
-    def parts(self, bounds: Bounds, box: Box, rows: DeviationRows) -> list[Part]:
-        """The cells; `rows` are the enclosures of all of them."""
+    def parts(self, pieces: list[DeviationRows]) -> list[Part]:
+        """The cells of all pieces."""
         return [
             Part(cell, *middle)
-            for piece, middle in zip(self.pieces(bounds, box, rows), self.middles, strict=True)
+            for piece, middle in zip(pieces, self.middles, strict=True)
             for cell in cells_of(piece, self.partition.split)
         ]
 

@@ -137,20 +137,21 @@ class Search(Cells):
             return Failure(reason=str(error))
 
     def _settled(self, bounds: Bounds) -> Impulse | Failure:
-        summed, box, taken = self.responses, self.box, self.rows
+        summed, box, taken = self.responses, self.box, self.pieces(bounds, self.box, self.rows)
         for _ in range(STEPS):
             known = [r for r in summed if r is not None]
             if len(known) < len(summed):
-                return self._unstable(self.parts(bounds, box, taken)[summed.index(None)], bounds)
+                return self._unstable(self.parts(taken)[summed.index(None)], bounds)
             known_rows = box is self.box and bounds is self.bounds
             rows = self.rows if known_rows else deviation_rows(self.model, bounds, self.gains, box)
-            moved = [found for piece in (rows, *self.pieces(bounds, box, rows)) if (found := demanded(box, piece))]
+            pieces = self.pieces(bounds, box, rows)
+            moved = [found for piece in (rows, *pieces) if (found := demanded(box, piece))]
             if moved:
                 ends = [found.low for found in moved], [found.high for found in moved]
                 low, high = np.minimum.reduce([box.low, *ends[0]]), np.maximum.reduce([box.high, *ends[1]])
                 box = replace(box, low=low, high=high)
                 continue
-            parts, control = self.parts(bounds, box, rows), controller(self.model, self.gains, rows, bounds.period)
+            parts, control = self.parts(pieces), controller(self.model, self.gains, rows, bounds.period)
             found = [self._cell(part.rows, r, control, bounds, box) for part, r in zip(parts, known, strict=True)]
             solved = [entry for entry in found if isinstance(entry, _Bound)]
             if len(solved) < len(found):
@@ -158,10 +159,10 @@ class Search(Cells):
             needed = self._needed(rows, solved, bounds)
             have = [box.half_widths, box.input_bound, box.network_bound, box.shown]
             if all((want * ROOM <= own).all() for want, own in zip(needed, have, strict=True)):
-                if _moved(taken, rows) <= MOVED:
-                    return self._certificate(rows, known, solved, bounds, box)
+                if _moved(taken[0], rows) <= MOVED:
+                    return self._certificate(rows, pieces, known, solved, bounds, box)
                 # an adaptive gain has a middle that depends on the box
-                summed, taken = self._responses(parts, bounds), rows
+                summed, taken = self._responses(parts, bounds), pieces
                 continue
             if (needed[0] > self.limit).any():
                 worst = int(np.argmax(needed[0] / self.limit))
@@ -230,13 +231,13 @@ class Search(Cells):
         return np.concatenate([bounds.initial, none, released, bounds.noise, none, rows.noise])
 
     def _certificate(
-        self, rows: DeviationRows, known: list[Responses], solved: list[_Bound], bounds: Bounds, box: Box
-    ) -> Impulse:
+        self, rows: DeviationRows, pieces: list[DeviationRows], known: list[Responses], solved: list[_Bound],
+        bounds: Bounds, box: Box,
+    ) -> Impulse:  # fmt: skip
         n, m = len(self.limit), len(self.model.inputs)
         solved = [self._shrinking(r, s, bounds) for r, s in zip(known, solved, strict=True)]
         settled = _after(solved, periods_in(bounds.transient, bounds.period))
         whole = np.concatenate([box.half_widths, box.input_bound])
-        pieces = self.pieces(bounds, box, rows)
         sizes = np.max([own.sizes(whole, resting=False) for own in pieces], axis=0)
         if bounds.rest[1] > 0:  # what a start makes of the loop has shrunk when the motion begins
             late = _after(solved, periods_in(bounds.rest[1], bounds.period))
@@ -249,7 +250,7 @@ class Search(Cells):
             effort=sizes[n:], states=sizes[:n], box=box, partition=self.partition,
             cells=tuple(
                 cell_of(r, (part.force, part.drive), s.growth, box, self.model.input_map)
-                for part, r, s in zip(self.parts(bounds, box, rows), known, solved, strict=True)
+                for part, r, s in zip(self.parts(pieces), known, solved, strict=True)
             ),
             rates=np.max([s.rates for s in solved], axis=0),
             networks=tuple(self.model.rows[i].state for i in self.own),

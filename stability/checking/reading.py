@@ -27,7 +27,7 @@ from .limits import (
 )
 from .parsing import index, number, numbers, reads, valid_program
 from .reference import reference_bounds
-from .statement import stroke_of
+from .statement import TIMES, stroke_of
 
 
 def read(data: dict[str, Any], entry: dict[str, Any], coupled: bool) -> Claim:
@@ -215,9 +215,9 @@ def gains_of(
     kinds = ("beta", "epsilon", "delta", "sigma", "gamma", "phi", "preload")
     given = {entry["name"]: number(entry["value"], entry["name"]) for entry in entries}
     names = [f"{kind}_{k + 1}" for k in range(len(controlled)) for kind in kinds]
-    names += [f"{kind}_{k + 1}" for k, row in enumerate(controlled) if row in led for kind in ("lead", "smooth")]
+    names += [f"{kind}_{k + 1}" for k, row in enumerate(controlled) if row in led for kind in TIMES]
     need(set(given) == set(names) and len(entries) == len(names), "the gains do not fit the subsystems")
-    gains = [tuple(given.get(f"{kind}_{k + 1}", Fraction(0)) for kind in (*kinds, "lead", "smooth"))
+    gains = [tuple(given.get(f"{kind}_{k + 1}", Fraction(0)) for kind in (*kinds, *TIMES))
              for k in range(len(controlled))]  # fmt: skip
     good = all(b > 0 and e >= 0 and d > 0 and s > 0 and g >= 0 and phi >= abs(p) * (g > 0) >= 0 <= min(times)
                for b, e, d, s, g, phi, p, *times in gains)  # fmt: skip

@@ -126,9 +126,7 @@ class Turn:
                 start[target] = mul(neg(loop.gain[target].beta), _point(Fraction(1, 2)))
                 if target in own:
                     start[n + own.index(target)] = _point(Fraction(-1))
-            starts.append(
-                [mul(v, _point(s / claim.half_widths[i])) for v, s in zip(start, scale[: n + q], strict=True)]
-            )
+            starts.append(_in_units(start, scale[: n + q], claim.half_widths[i]))
         starts = [self.lags.spaced(row) for row in starts] + [[ZERO] * (self.n + q) for _ in claim.lags]
         self.start, self.start_spread = split_of(starts)
         self.noise = [up(v / r) for v, r in zip(claim.noise, claim.half_widths, strict=True)]

@@ -12,7 +12,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from ..enclosures.form import ZERO, Form, Symbols
-from ..enclosures.interval import Interval, total
+from ..enclosures.interval import Interval
+from .box import over
 
 #: The range of b* is widened by this share of its size before what reads it is bounded.
 WIDER = 1e-6
@@ -34,11 +35,11 @@ class Balance:
 
     def range(self, ranges: Mapping[str, Interval]) -> Interval:
         """Where b* is for ranges of the signals."""
-        return self.value.constant + total(c * ranges[s] for s, c in self.value.coefficients.items())
+        return over(self.value, ranges)
 
     def rate(self, rates: Mapping[str, Interval]) -> Interval:
         """How fast b* moves for rates of the signals."""
-        return total(c * rates[s] for s, c in self.value.coefficients.items())
+        return over(Form(self.value.coefficients), rates)
 
 
 def balance(

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from ..enclosures.form import ONE, Form
 from ..enclosures.interval import Interval, total
-from .balance import balance
 from .box import Box, DeviationRows, UnboundedError, over
 from .model import Bounds, Gains, LoopModel, balance_of
 from .observer import SHOWN
@@ -179,7 +178,7 @@ class _Builder(Builder):
             raise ValueError("a row is held by one load network or one mode")
         demands = {i: self._demand(i, raw[k], rows[k], masses[k], self.target_rate[k]) for i, k in places.items()}
         rest = {places[i]: demand.rest for i, demand in demands.items()}
-        rest |= {k: self._carried(i, raw[k], masses[k]) for i, k in self.model.balanced.items()}
+        rest |= {k: self.symbols.range_of(self.balances[i].left).magnitude for i, k in self.model.balanced.items()}
         left = [rest[k] if k in rest else self._disturbance(row, "Qe") for k, row in enumerate(rows)]
         halves = [self.half_gain[i] * ROUNDED for i in self.model.controlled]
         inputs = self.model.input_map
@@ -241,15 +240,6 @@ class _Builder(Builder):
             range=level / drive, rate=change / drive.low * (1 + 1e-12), rest=left.magnitude,
             lean=(left.low + left.high) / 2, settled=rested / least, resting=still / drive,
         )  # fmt: skip
-
-    def _carried(self, i: int, raw: Form, mass: Interval) -> float:
-        """What is left of a row that the state of row i balances."""
-        own, row = f"w:{balance_of(self.model.rows[i].state)}", self.model.rows[self.model.balanced[i]]
-        found = balance(raw, own, mass, self._rate_of(row), self._rates_of_signals(), self.symbols)
-        needed, span = found.range(self.symbols.ranges), self.symbols.ranges[own]
-        if not (span.low <= needed.low and needed.high <= span.high):
-            raise ValueError(f"what {self.model.rows[i].state} carries does not settle")
-        return self.symbols.range_of(found.left).magnitude
 
     def _resting(self) -> dict[str, Interval]:
         """The reference while it rests at first, and what modes carry then."""

@@ -13,8 +13,9 @@ from .observer import Observer
 
 #: The signal of a target that is one, and the derivatives of the reference that have a bounded rate.
 CONSTANT, SIGNALS = "constant", ("r0", "r1", "r2")
-#: What rows track that follow no other row, as sums of signals.
+#: What a mode tracks that carries what the only other row that reads it needs.
 BALANCE = "balance"
+#: What rows track that follow no other row, as sums of signals.
 ALONE: Mapping[str, Mapping[str, float]] = {"reference": {"r0": 1.0}, "zero": {}}
 
 

@@ -174,7 +174,7 @@ def test_cells_and_lags_tighten_the_bound(problem, values):
     assert found[0].lags == ("opening",) and len(found[1].cells) == 18
     search = Search(member.model, member.bounds, own, member.box, partition=whole)
     search.lags = ()
-    search.responses = search._responses(search.parts(member.bounds, search.box, search.rows), member.bounds)
+    search.responses = search._responses(search.parts([search.rows]), member.bounds)
     plain = search.run(member.bounds)
     assert isinstance(plain, Failure) or plain.ultimate[0] > 1.1 * found[0].ultimate[0]
 
