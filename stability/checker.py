@@ -159,6 +159,11 @@ requirements: What a study requires beside the error, as far as it is proved: se
   time; M x' = g u - c x with c > 0 keeps |x| below its start and sup|g u| / c. Must fail: a smaller peak or RMS than
   this, an earlier settling time, an output that is not the member's.
 
+shared: What members draw on together: an output of each adds up, and there is only so much.
+
+  Theorem: the sum of the amounts is at most the sum of the largest ones, each over the whole motion. Must fail: less to
+  draw on, a member whose output is not told or is in another unit.
+
 command: The command: files in, verdicts out.
 """
 
@@ -216,7 +221,8 @@ LEAST_EFFECT = Fraction(1, 10**9)
 LEAST_LOAD = Fraction(1, 10**4)
 #: A member moves the output by at least this much per unit of its position, m/m or m/rad.
 LEAST_SLOPE = 0.05
-#: Interval products that all members and the coupling of a machine may take; files of ours take up to half.
+#: Interval products that all members and the coupling of a machine may take, and each of members that nothing joins;
+#: files of ours take up to half.
 MAX_PRODUCTS, MAX_COUPLED = 200_000, 4_000_000
 #: Members of a machine, and slices of time that its motion may be cut into.
 MAX_MEMBERS, MAX_SLICES = 8, 1_000
@@ -1096,10 +1102,10 @@ PAIR = listed(plain_number, 2, 2)
 TRIPLE = listed(plain_number, 3, 3)
 LIMIT = entry_of({"value": positive, "unit": unit, "source": SOURCE})
 STROKES = {key: PAIR for key in ("stroke_m", "stroke_rad", "stroke_m_s", "stroke_rad_s")}
+CONSTANT = entry_of({"value": plain_number, "unit": unit, "tolerance": plain_number, "source": SOURCE, "meaning": text})
 DRIVE = entry_of(
     {
-        "parameters": named(entry_of({"value": plain_number, "unit": unit, "tolerance": plain_number,
-                                      "source": SOURCE, "meaning": text})),
+        "parameters": named(CONSTANT),
         "limits": named(LIMIT),
     },
     {"ratings": named(LIMIT), "least_effectiveness": plain_number, "bundled": listed(text, 0, 64), **STROKES},
@@ -1112,6 +1118,7 @@ SCENARIO = {
     "name": text, "disturbances": named(COURSE), "parameters": named(plain_number), "noise": plain_number,
     "bias": plain_number, "initial": plain_number, "quantisation": plain_number, "faults": named(FAULT),
 }  # fmt: skip
+GROUND = {"ground": named(COURSE)}
 MOTION_LIMITS = entry_of(
     {},
     {**dict.fromkeys(("speed_m_s", "acceleration_m_s2", "jerk_m_s3"), plain_number),
@@ -1128,7 +1135,8 @@ STUDY = entry_of(
         "plant": entry_of(
             {"model": text, "parameters": NOTHING, "ratings": NOTHING, "limits": NOTHING,
              "joints": named(DRIVE, MAX_MEMBERS), "locked": named(plain_number)},
-            {"level": name, "sensor": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
+            {"body": named(CONSTANT), "shared": named(LIMIT),
+             "level": name, "sensor": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
         ),
         "uncertainty": entry_of({
             "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit},
@@ -1159,7 +1167,7 @@ STUDY = entry_of(
             {"seconds": positive},
         ),
         "validation": entry_of({"transient_s": plain_number, "monte_carlo": whole, "falsify": whole,
-                                "worst_case": flag, "scenarios": listed(entry_of(SCENARIO), 1, 200)}),
+                                "worst_case": flag, "scenarios": listed(entry_of(SCENARIO, GROUND), 1, 200)}),
         "sha256": HASH,
     }
 )  # fmt: skip
@@ -1225,12 +1233,12 @@ FIGURES = entry_of({
                         RECORDED),
         "peaks": named(RECORDED), "rms": named(RECORDED), "estimates": listed(RECORDED, 0, 2),
     }, {"travel": RECORDED})),
-})  # fmt: skip
+}, {"met_use": RECORDED})  # fmt: skip
 VALIDATION = entry_of({
     "requirements": listed(entry_of({"name": text, "required": plain_number, "simulated": plain_number,
                                      "certified": maybe(plain_number)}), 1, 32),
     "scenarios": listed(entry_of({"name": text, "figures": FIGURES}), 1, 200),
-    "worst_case": maybe(entry_of({"scenario": entry_of({**SCENARIO, "seed": whole}), "figures": FIGURES})),
+    "worst_case": maybe(entry_of({"scenario": entry_of({**SCENARIO, "seed": whole}, GROUND), "figures": FIGURES})),
     "monte_carlo": maybe(entry_of({"runs": whole, "met": whole})),
     "simulated_runs": whole, "integration_error_m": plain_number, "largest_error_m": plain_number,
     "largest_error_after_transient_m": plain_number,
@@ -1598,6 +1606,7 @@ def _runs(data: dict[str, Any], certified: dict[str, Fraction]) -> None:
     study, shown = data["study"]["validation"], data["validation"]
     told = {row["name"]: row["simulated"] for row in shown["requirements"]}
     runs = [r["figures"] for s, r in zip(study["scenarios"], shown["scenarios"], strict=True) if not s["faults"]]
+    runs = [run_ for run_ in runs if "met_use" not in run_ or run_["met_use"] is None or run_["met_use"] <= 1]
     runs += [shown["worst_case"]["figures"]] if shown["worst_case"] is not None else []
     for run_ in runs:
         need(run_["diverged_s"] is None and run_["maximum_error_m"] is not None, "a recorded run was lost")
@@ -1802,7 +1811,7 @@ def follows(data: dict[str, Any], entry: dict[str, Any], claim: Claim, which: in
             need(lasted <= number(section["longest_s"], "longest_s") * (1 + MET), f"move {k + 1} lasts too long")
     lasted = number(segments[-1]["knots"][-1], "a knot")
     need(claim.transient < lasted, "the transient outlasts the reference")
-    _limited(section, claim, segments, which, count)
+    _limited(section, claim, segments, which, count if data["couplings"] else 1)
 
 
 def _of(segment: dict[str, Any]) -> tuple[list[Fraction], list[Fraction]]:
@@ -4460,7 +4469,7 @@ def _settled(data: dict[str, Any], members: list[Member], coupling: Coupling | N
 
     def inside(time: Fraction) -> bool:
         sizes = [member.verdict.sizes(time)[0] for member in members]
-        return (sizes[0] if coupling is None else coupling.output(sizes)) <= band
+        return (max(sizes) if coupling is None else coupling.output(sizes)) <= band
 
     if inside(Fraction(0)):
         return Fraction(0)
@@ -4491,13 +4500,24 @@ def _effort(
             return None, None
         if own[output][0] == unit:
             segments = entry["reference"]["segments"]
-            if sum(max(WHOLE_MOVE, len(segment["coefficients"])) for segment in segments) > MOST_SLICES:
+            if _count(segments) > MOST_SLICES:
                 return None, None
             parts = list(_slices(segments, member, own[output][1]))
             whole = sum((lasted for lasted, _ in parts), Fraction(0))
             peaks.append(max(square for _, square in parts))
             means.append(sum((lasted * square for lasted, square in parts), Fraction(0)) / whole)
     return (root(up(max(peaks)), True), root(up(max(means)), True)) if peaks else (None, None)
+
+
+def largest_of(entry: dict[str, Any], member: Member, program: dict[str, Any]) -> Fraction:
+    """A bound on the square of an output over the whole motion."""
+    segments = entry["reference"]["segments"]
+    need(_count(segments) <= MOST_SLICES, "an output is bounded over fewer slices of a motion")
+    return max(square for _, square in _slices(segments, member, program))
+
+
+def _count(segments: list[dict[str, Any]]) -> int:
+    return sum(max(WHOLE_MOVE, len(segment["coefficients"])) for segment in segments)
 
 
 def _slices(
@@ -4591,6 +4611,25 @@ def _begun_of(member: Member, loop: Loop, i: int, target: int) -> Fraction:
     return up(claim.initial[i] + control)
 
 
+# --- shared ---
+
+def drawn_together(data: dict[str, Any], members: list[Member]) -> list[Obligation]:
+    """Decide that what the members draw on together is there."""
+    made = []
+    for name, limit in data["study"]["plant"].get("shared", {}).items():
+        total = Fraction(0)
+        for entry, member in zip(data["members"], members, strict=True):
+            own = outputs_of(entry["model"], member)
+            need(name in own, f"{member.name} does not tell its {name}, which all draw on together")
+            need(own[name][0] == limit["unit"], f"the {name} of {member.name} must be in {limit['unit']}")
+            total += root(up(largest_of(entry, member, own[name][1])), True)
+        most = number(limit["value"], name)
+        statement = f"all {len(members)} members together take up to {upward(total)} {limit['unit']} of {name}"
+        remedy = f"{upward(total)} {limit['unit']} of {name}, or a slower motion"
+        made.append(decided("supply", statement, most - total, limit["unit"], remedy, strict=False))
+    return made
+
+
 # --- command ---
 
 def check_text(text: str, file: str = "", *, recorded: bool = True) -> Report:
@@ -4657,11 +4696,12 @@ def check_machine(data: dict[str, Any], file: str, recorded: bool = True) -> Rep
     couplings = data["couplings"]
     need(isinstance(couplings, list) and len(couplings) <= 1, "a machine has one coupling, or none")
     need(all(entry["members"] == names for entry in couplings), "a coupling is of all members in their order")
-    need(len(names) == 1 or bool(couplings), "members without a coupling are files of their own")
     made: list[Obligation] = []
     WORK.begin(MAX_PRODUCTS)
     members = []
     for which in range(len(names)):
+        if not couplings:  # each is by itself, and costs what a file of its own would
+            WORK.begin(MAX_PRODUCTS)
         member = check_member(data, which, bool(couplings))
         made += member.made
         if member.failed:
@@ -4680,11 +4720,15 @@ def check_together(
         made.append(guarantees_kept(data, members))
     coupling = Coupling(data, data["couplings"][0], members) if data["couplings"] else None
     made += coupling.obligations() if coupling is not None else []
+    made += drawn_together(data, members)
     wrong = [o for o in made if o.verdict != "proved"]
     if wrong:
         text = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"
         return Report(file, 1, f"not proved: {text}", made)
-    proved = {"tracking_error_m": members[0].claim.ultimate[0] if coupling is None else coupling.stated}
+    units = {str(member.claim.rows[0]["unit"]) for member in members}
+    need(coupling is not None or len(units) == 1, "the first states of members without a coupling have one unit")
+    worst = max(member.claim.ultimate[0] for member in members)
+    proved = {"tracking_error_m": worst if coupling is None else coupling.stated}
     if len(members) > 1:
         proved |= {f"member_error.{m.name}": m.claim.ultimate[0] for m in members}
     proved |= beyond_error(data, members, coupling)
@@ -4701,13 +4745,14 @@ def check_together(
             raise
         records = str(error)
     reach = [member.claim.half_widths[0] for member in members]
-    inside = reach[0] if coupling is None else coupling.output(reach)
+    inside = max(reach) if coupling is None else coupling.output(reach)
     need(0 <= number(data["validation"]["largest_error_m"], "largest_error_m"), "an error must not be negative")
     if number(data["validation"]["largest_error_m"], "largest_error_m") > inside:
         return Report(file, 1, "not proved: the recorded simulation leaves the certified envelope", made)
-    settled, unit = upward(members[0].claim.transient, 6), str(members[0].claim.rows[0]["unit"])
-    bound = milli(proved["tracking_error_m"], unit if coupling is None else "m")
-    of = "" if coupling is None else f" of the output, all {len(members)} members together"
+    settled = upward(members[0].claim.transient, 6)
+    bound = milli(proved["tracking_error_m"], units.pop() if coupling is None else "m")
+    of = "" if len(members) == 1 else f" of each of {len(members)} members"
+    of = of if coupling is None else f" of the output, all {len(members)} members together"
     message = f"proved: |tracking error{of}| <= {bound} from {settled} s on"
     used = [use for member in members for use in member.used]
     return Report(file, 0, message, made, used, *unsourced(data), data["study"]["plant"]["model"], records, required)
@@ -4723,6 +4768,8 @@ def unsourced(data: dict[str, Any]) -> tuple[list[str], list[str]]:
         for kind, after in (("parameters", ""), ("ratings", ""), ("limits", " limit")):
             entries = section.get(kind, {}).items()
             assumed += [before + name + after for name, entry in entries if entry["source"] == "assumed"]
+    body = data["study"]["plant"].get("body", {}).items()
+    assumed += [f"body.{name}" for name, entry in body if entry["source"] == "assumed"]
     return bundled, assumed
 
 
@@ -4787,10 +4834,13 @@ def show(reports: list[Report], *, as_json: bool, verbose: bool = False) -> None
 def limit_lines(report: Report) -> list[str]:
     """What is certified of the limits, in lines of a terminal."""
     members = list(dict.fromkeys(use.member for use in report.uses))
-    lines = []
+    alike: dict[str, list[str]] = {}
     for member in members:
         shares = ", ".join(f"{u.name} {percent(u.share, up=True)}" for u in report.uses if u.member == member)
-        before = f"{member}: " if len(members) > 1 else ""
+        alike.setdefault(shares, []).append(member)
+    lines = []
+    for shares, own in alike.items():
+        before = f"{', '.join(own)}: " if len(members) > 1 else ""
         lines += wrapped(f"{before}of its limits at most: {shares}")
     return lines
 
@@ -4808,8 +4858,20 @@ def requirement_lines(report: Report) -> list[str]:
 def source_lines(report: Report) -> list[str]:
     """What the numbers rest on, in lines of a terminal."""
     whose = f"the defaults of {report.model}" if ".py" in report.model else f"of the bundled {report.model}"
-    lines = wrapped(f"still {whose}: {', '.join(report.bundled)}") if report.bundled else []
-    return lines + (wrapped(f"assumed: {', '.join(report.assumed)}") if report.assumed else [])
+    members = list(dict.fromkeys(use.member for use in report.uses))
+    lines = wrapped(f"still {whose}: {gathered(report.bundled, members)}") if report.bundled else []
+    return lines + (wrapped(f"assumed: {gathered(report.assumed, members)}") if report.assumed else [])
+
+
+def gathered(names: list[str], members: list[str]) -> str:
+    """Names of numbers, each once with the members in brackets that have it."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        owner, _, key = name.rpartition(".")
+        found.setdefault(key, []).append(owner)
+    return ", ".join(
+        key if own == [""] else f"{key} ({'all' if own == members else ', '.join(own)})" for key, own in found.items()
+    )
 
 
 def obligation_lines(report: Report, *, everything: bool) -> list[str]:

@@ -36,7 +36,7 @@ NEEDED = "an actuator is exchanged in a proved file"
     nargs=2,
     type=(click.Path(path_type=Path), str),
     metavar="FILE MEMBER",
-    help="For members that push each other: take FILE's proofs, prove anew only MEMBER, whose actuator is another.",
+    help="For machines of several members: take the proofs of FILE, prove anew only MEMBER, whose actuator is another.",
 )
 @VERBOSE
 @work

@@ -61,8 +61,9 @@ def run(path: Path, name: str | None, csv_path: Path | None, as_json: bool) -> i
             _show(figures.to_data())
     lines = []
     for key, figures in results.items():
-        if not within_assumptions(problem, known[key][1]):
-            click.echo(f"{key} has a fault outside the assumptions of the proof: no requirement applies", err=True)
+        if not within_assumptions(problem, known[key][1], figures):
+            what = "has a fault" if known[key][1].faults else "is"
+            click.echo(f"{key} {what} outside the assumptions of the proof: no requirement applies", err=True)
         else:
             lines += missed(problem, key, figures)
     for line in lines:
@@ -91,8 +92,9 @@ def to_csv(problem: Problem, trace: Trace) -> str:
     columns: dict[str, Any] = {"time [s]": trace.t}
     for disturbance in problem.machine.disturbances:
         columns[f"{disturbance.name} [{disturbance.unit}]"] = trace.disturbances[disturbance.name]
-    columns["error [m]"] = trace.error
-    for k, letter in enumerate(problem.machine.coordinates if several else ()):
+    columns |= trace.body
+    columns[f"error [{problem.machine.output_unit}]"] = trace.error
+    for k, letter in enumerate(problem.machine.coordinates if several and not trace.free else ()):
         columns |= {f"output {letter} [m]": trace.place[k], f"output reference {letter} [m]": trace.wanted[k]}
     for member in problem.members:
         own, plant, prefix = trace.members[member.name], member.plant, f"{member.name} " if several else ""

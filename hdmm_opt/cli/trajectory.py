@@ -76,13 +76,14 @@ def _members(problem: Problem) -> None:
     from ..motions.single_axis import effort_table, largest_loads
 
     if problem.loads is None:
-        (member,) = problem.members
-        for row in effort_table(problem.study, member.plant, member.reference):
-            limit = "no limit" if row["limit"] is None else f"limit {row['limit']:g}"
-            click.echo(f"  {row['quantity']:13} {row['peak']:10.4g} {row['unit']:6} {limit}")
-        if member.plant.efforts is not None:
-            loads = ", ".join(f"{load:g} {member.plant.load_unit}" for load in largest_loads(problem.study))
-            click.echo(f"  efforts at the nominal machine under the largest load, {loads}")
+        for member in problem.members:
+            for row in effort_table(problem.study, member.plant, member.reference):
+                what = f"{problem.prefix(member)}{row['quantity']}"
+                limit = "no limit" if row["limit"] is None else f"limit {row['limit']:g}"
+                click.echo(f"  {what:13} {row['peak']:10.4g} {row['unit']:6} {limit}")
+            if member.plant.efforts is not None:
+                loads = ", ".join(f"{load:g} {member.plant.load_unit}" for load in largest_loads(problem.study))
+                click.echo(f"  efforts at the nominal machine under the largest load, {loads}")
         return
     foreseen = problem.loads.feedforward(problem.slices)
     for member, (load, _), own in zip(problem.members, foreseen, problem.machine.own, strict=True):

@@ -46,7 +46,7 @@ def build(
         member = plain.under(contract.bounds)
         members.append({
             "name": member.name,
-            "model": model_data(member),
+            "model": model_data(member, problem.machine.shared),
             "nominal": dict(member.bounds.nominal),
             **observer_data(member),
             "gains": gains_data(member, gains[member.name]),

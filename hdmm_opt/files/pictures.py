@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..problem import GainSet, Member, Problem
-from ..simulation import Trace, within_assumptions
+from ..simulation import Run, Trace, within_assumptions
 from .read import certified_of, rejected, ultimate_of
 from .restore import offered
 from .text import upward
@@ -84,7 +84,9 @@ def pictures(document: Mapping[str, Any], problem: Problem, gains: GainSet) -> P
     """
     shown = []
     for name, (loop, scenario) in offered(document, problem).items():
-        inside = within_assumptions(problem, scenario)
+        run = [Run(gains=gains, scenario=scenario)]
+        figures = loop.figures(run)[0] if scenario.ground is not None else None
+        inside = within_assumptions(problem, scenario, figures)
         kind = ("worst" if name in ("worst-case", "witness") else "run") if inside else "outside"
         shown.append(Shown(name=name, trace=loop.trace(gains, scenario), kind=kind))
     sections = {
@@ -173,8 +175,9 @@ def _references(problem: Problem, member: Member) -> list[Panel]:
 def _loads(problem: Problem) -> list[Panel]:
     found = []
     for disturbance in problem.machine.disturbances:
-        low, high = problem.study.uncertainty.disturbances[disturbance.name].range
-        levels = tuple((end, CERTIFIED, f"covered {word} {end:.4g}") for end, word in ((low, "from"), (high, "to")))
+        span = problem.disturbance(disturbance.name)
+        ends = (span.low, "from"), (span.high, "to")
+        levels = tuple((end, CERTIFIED, f"covered {word} {end:.4g}") for end, word in ends)
         found.append(Panel(
             title=f"{disturbance.name.replace('_', ' ')} [{disturbance.unit}]", levels=levels,
             curve=lambda trace, name=disturbance.name: trace.disturbances[name],

@@ -65,7 +65,7 @@ def certified_of(document: Mapping[str, Any]) -> float:
     """The certified bound on the error of the output after the transient, m."""
     if document["couplings"]:
         return above(document["couplings"][0]["envelope"]["output"])
-    return ultimate_of(document["members"][0])
+    return max(map(ultimate_of, document["members"]))
 
 
 def ultimate_of(entry: Mapping[str, Any]) -> float:

@@ -19,7 +19,8 @@ def rejected_document(found: Design) -> dict[str, Any]:
         "schema": REJECTED,
         "study": resolved(problem),
         "members": [
-            {"name": m.name, "model": model_data(m), "gains": gains_data(m, found.gains[m.name]),
+            {"name": m.name, "model": model_data(m, problem.machine.shared),
+             "gains": gains_data(m, found.gains[m.name]),
              "reference": reference_data(m.reference, m.plant.reference_units)}
             for m in problem.members
         ],

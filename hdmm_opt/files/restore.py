@@ -107,7 +107,7 @@ def _same_machine(document: Mapping[str, Any], problem: Problem) -> None:
     foreign = own_name(problem.study.plant.model)
     for member, entry in zip(problem.members, document["members"], strict=True):
         if not foreign:  # else it was made of that model
-            made[member.name], given[member.name] = model_data(member), entry["model"]
+            made[member.name], given[member.name] = model_data(member, problem.machine.shared), entry["model"]
         made[f"nominal of {member.name}"], given[f"nominal of {member.name}"] = (
             dict(member.bounds.nominal),
             entry["nominal"],
@@ -123,6 +123,8 @@ def _same_machine(document: Mapping[str, Any], problem: Problem) -> None:
 
 def standing(document: Mapping[str, Any], study: Study, name: str) -> tuple[Problem, GainSet, Contracts, Member]:
     """A machine with one other actuator: its problem, the standing gains and proofs, and the member that is replaced.
+
+    Members that nothing joins guarantee nothing to each other: there are no standing proofs to keep.
 
     Args:
         document: The proved file of the machine.
@@ -143,7 +145,7 @@ def standing(document: Mapping[str, Any], study: Study, name: str) -> tuple[Prob
         if new.name != name and not same:
             raise InvalidInputError(f"the studies differ in {new.name} too; design the machine anew")
     contracts: Contracts = {}
-    for entry in document["members"]:
+    for entry in document["members"] if problem.linked else ():
         key = entry["name"]
         plain = old if key == name else problem
         bounds = _stated(old.member(key), entry)

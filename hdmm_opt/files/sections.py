@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from decimal import ROUND_CEILING, ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 from typing import Any
@@ -50,16 +51,20 @@ def reference_data(
     }
 
 
-def model_data(member: Member) -> dict[str, Any]:
+def model_data(member: Member, shared: Iterable[str]) -> dict[str, Any]:
     """Plant and law of a member as operation lists, and what its limits are about."""
     limits = [{"name": limit.name, "signals": list(limit.signals)} for limit in member.plant.limits]
-    return {**member.model.to_data(), "limits": limits, "first": member.plant.first, "outputs": outputs_data(member)}
+    outputs = outputs_data(member, shared)
+    return {**member.model.to_data(), "limits": limits, "first": member.plant.first, "outputs": outputs}
 
 
-def outputs_data(member: Member) -> dict[str, Any]:
-    """The outputs that a requirement can be about, where they follow from states and inputs in operations of a file."""
+def outputs_data(member: Member, shared: Iterable[str] = ()) -> dict[str, Any]:
+    """The outputs that are drawn on together or that a requirement can be about, in operations of a file.
+
+    Those are left out that do not follow from states, inputs and parameters.
+    """
     plant, found = member.plant, {}
-    wanted = {output for _, output in MEMBER.values()}
+    wanted = {*(output for _, output in MEMBER.values()), *shared}
     for name in sorted(wanted & set(plant.output_units)):
         program, other = program_of(plant, plant.outputs[name])
         if program is not None and not other and not set(plant.disturbances) & set(program.inputs):

@@ -16,6 +16,8 @@ def assumed(problem: Problem) -> tuple[str, ...]:
         numbers = {**plant.parameters, **plant.ratings}
         found += [f"{prefix}{key}" for key, p in numbers.items() if p.source == "assumed"]
         found += [f"{prefix}{limit.name} limit" for limit in plant.limits if limit.source == "assumed"]
+    body = problem.machine.body
+    found += [f"body.{key}" for key, p in body.parameters.items() if p.source == "assumed"] if body else []
     return tuple(found)
 
 

@@ -34,12 +34,28 @@ def contracts_of(problem: Problem, gains: GainSet, *, refine: bool = False) -> C
     if problem.linked:
         return solve_contracts(problem.subsystems(gains), problem.assume, fine=refine and refinable(problem))
     found: Contracts = {}
-    for member in problem.members:
-        one = certificate(member, gains[member.name], refine=refine)
+    for name, one in _each(problem, gains, refine=refine).items():
         if isinstance(one, Failure):
             return one
-        found[member.name] = Contract(guarantee=None, reached=None, bounds=member.bounds, certificate=one)
+        bounds = problem.member(name).bounds
+        found[name] = Contract(guarantee=None, reached=None, bounds=bounds, certificate=one)
     return found
+
+
+def _each(problem: Problem, gains: GainSet, *, refine: bool) -> dict[str, Impulse | Failure]:
+    """The certificate of every member by itself; members that are alike are proved once."""
+    found: dict[str, Impulse | Failure] = {}
+    for k, member in enumerate(problem.members):
+        values, before = gains[member.name], problem.members[:k]
+        twin = next((m for m in before if gains[m.name] == values and _alike(m, member)), None)
+        found[member.name] = found[twin.name] if twin else certificate(member, values, refine=refine)
+    return found
+
+
+def _alike(one: Member, other: Member) -> bool:
+    """Whether a proof of one member is a proof of the other, with the same gains."""
+    same = one.bounds == other.bounds and one.plant.parameters == other.plant.parameters
+    return same and one.model.to_data() == other.model.to_data() and np.array_equal(one.box, other.box)
 
 
 def refinable(problem: Problem) -> bool:
@@ -98,8 +114,8 @@ def strongest(problem: Problem, gains: GainSet) -> Strongest:
         finer = contracts_of(problem, gains, refine=True) if refinable(problem) else found
         return Strongest(contracts=found if isinstance(finer, Failure) else finer, notes=())
     better: Contracts = {}
-    for name in problem.subsystems(gains):
-        member, finer = problem.member(name), certificate(problem.member(name), gains[name], refine=True)
+    for name, finer in _each(problem, gains, refine=True).items():
+        member = problem.member(name)
         taken = min((found[name].certificate, finer), key=lambda c: _rank(member, c, gains[name]))
         assert isinstance(taken, Impulse)
         better[name] = replace(found[name], certificate=taken)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from stability import Failure
@@ -84,6 +84,16 @@ def contribution_lines(problem: Problem, found: list[Contribution]) -> list[str]
         after = "" if changed else ": it contributes nothing"
         lines.append(f"without {without.part}: {told}, simulated {1e3 * without.simulated:.4g} {unit}{after}")
     return lines
+
+
+def together(problem: Problem, lines: Sequence[str]) -> list[str]:
+    """Lines about members, with those that say the same of several in one."""
+    found: dict[str, list[str]] = {}
+    for line in lines:
+        member, colon, rest = line.partition(": ")
+        named = colon and member in problem.machine.members
+        found.setdefault(rest if named else line, []).append(member if named else "")
+    return [f"{', '.join(own)}: {text}" if own[0] else text for text, own in found.items()]
 
 
 def budget_lines(problem: Problem, gains: GainSet, contracts: Contracts) -> list[str]:

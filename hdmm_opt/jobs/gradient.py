@@ -17,7 +17,7 @@ from stability import Failure
 from tuning import Budget, Derivatives, descend
 
 from ..problem import GainSet, Problem
-from ..problem.margins import HEADROOM, margins
+from ..problem.margins import HEADROOM, margins, of_machine
 from ..problem.problem import Contracts
 from ..simulation import Loop, Run
 from .certify import contracts_of
@@ -89,14 +89,15 @@ def derivatives(loop: Loop, point: Array, wanted: bool) -> Derivatives:
 def _directions(problem: Problem, gains: GainSet) -> Array:
     """What each coordinate of the unit cube does to all gains, member by member. Shape (d, gains)."""
     made = np.zeros((problem.searched, sum(len(values) for values in gains.values())))
-    first = row = 0
-    for member in problem.members:
-        values = gains[member.name]
-        for index in member.searched:
-            item = member.ranges[index]
-            made[row, first + index] = values[index] * math.log(item.high / item.low)
+    sizes = [len(values) for values in gains.values()]
+    begins = dict(zip(gains, np.cumsum([0, *sizes[:-1]]), strict=True))
+    row = 0
+    for group in problem.groups:
+        for index in group[0].searched:
+            for member in group:
+                item = member.ranges[index]
+                made[row, begins[member.name] + index] = gains[member.name][index] * math.log(item.high / item.low)
             row += 1
-        first += len(values)
     return made
 
 
@@ -112,4 +113,4 @@ def _room(problem: Problem, found: Contracts, gains: GainSet) -> Array:
 
 def _count(problem: Problem) -> int:
     of_members = sum(len(m.plant.limits) + 2 + len(m.law.controlled) for m in problem.members)
-    return of_members + (problem.loads is not None)
+    return of_members + of_machine(problem)

@@ -25,7 +25,7 @@ from ..simulation import Loop
 from ..study import Study
 from .certify import longest_period, refinable, strongest
 from .condition import condition_lines
-from .contributions import budget_lines, contribution_lines, contributions
+from .contributions import budget_lines, contribution_lines, contributions, together
 from .falsification import falsify
 from .options import FINE, Effort, Options, Progress, effort_of
 from .polish import polished
@@ -125,7 +125,8 @@ def finished(
         shares = contribution_lines(problem, contributions(problem, tuned.gains))
         condition = condition_lines(problem, tuned.gains, contracts)
         reserve = reserve_lines(problem, tuned.gains, contracts) if options.full else []
-        parts = (*budget_lines(problem, tuned.gains, contracts), *reserve, *shares, *condition)
+        budget = together(problem, budget_lines(problem, tuned.gains, contracts))
+        parts = (*budget, *reserve, *shares, *together(problem, condition))
     return Design(
         document=proved if accepted else None, report=report, verdicts=tuple(from_checker(report)),
         missed=shown.missed, gains=tuned.gains, problem=problem, shown=shown, notes=notes, parts=parts,

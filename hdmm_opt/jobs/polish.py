@@ -54,8 +54,8 @@ def polished(problem: Problem, tuned: Tuned, options: Options, progress: Progres
 def directions(problem: Problem) -> list[Array]:
     """Both ways along every gain, and along every pair of a member's: a limit that binds lets gains move together."""
     axes, found, first = np.eye(problem.searched), [], 0
-    for member in problem.members:
-        own = axes[first : first + len(member.searched)]
+    for group in problem.groups:
+        own = axes[first : first + len(group[0].searched)]
         first += len(own)
         found += [*own, *((a + sign * b) / np.sqrt(2) for a, b in combinations(own, 2) for sign in (1, -1))]
     return [sign * way for way in found for sign in (1, -1)]

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from stability import Failure
-from stability.networks.contracts import replaced
+from stability.networks.contracts import Contract, replaced
 
 from ..errors import InvalidInputError
 from ..files.restore import standing
@@ -19,6 +19,7 @@ from ..problem import GainSet, Member, Problem
 from ..problem.margins import certified_error, violation
 from ..problem.problem import Contracts
 from ..study import Study
+from .certify import certificate
 from .options import Options, Progress, effort_of
 from .pipeline import finished
 from .start import Tuned, bandwidths, with_bandwidths
@@ -46,14 +47,20 @@ def replace_actuator(
         guarantee that the others were proved under.
 
     Raises:
-        InvalidInputError: the study cannot be made concrete, or the machine has no coupling.
+        InvalidInputError: the study cannot be made concrete, or the machine has one member.
         DefectError: a simulation left its certified envelope.
     """
     begun = time.perf_counter()
     progress.stage("reference")
     problem, gains, contracts, before = standing(document, study, name)
+    if len(problem.members) == 1:
+        raise InvalidInputError("--exchange is for machines of several members: design this one anew")
     if not problem.linked:
-        raise InvalidInputError("--exchange is for members that guarantee something: design this machine anew")
+        contracts = _alone(problem, gains, name)
+    fixed = (
+        item.low if item.fixed else value for item, value in zip(problem.member(name).ranges, gains[name], strict=True)
+    )
+    gains = {**gains, name: tuple(fixed)}  # what is not searched follows from the new actuator
     progress.stage(f"gains of {name}")
     tuned = _Nearby(problem, gains, contracts, name, before).search()
     kept = {entry["name"]: entry for entry in document["members"] if entry["name"] != name}
@@ -61,6 +68,17 @@ def replace_actuator(
         problem, tuned, tuned.contracts, effort_of(study, options), options, State(None, {}, resume=False), progress,
         begun, kept=kept,
     )  # fmt: skip
+
+
+def _alone(problem: Problem, gains: GainSet, name: str) -> Contracts:
+    """The proofs of all members but one that nothing joins."""
+    found = {m.name: certificate(m, gains[m.name], refine=True) for m in problem.members if m.name != name}
+    made: Contracts = {}
+    for key, one in found.items():
+        if isinstance(one, Failure):
+            raise InvalidInputError(f"{key} of this file is not proved by this release: design the machine anew")
+        made[key] = Contract(guarantee=None, reached=None, bounds=problem.member(key).bounds, certificate=one)
+    return made
 
 
 class _Nearby:
@@ -94,9 +112,20 @@ class _Nearby:
         member = self.problem.member(self.name)
         widths = [factor * width for factor, width in zip(point, self.widths, strict=True)]
         together = {**self.gains, self.name: with_bandwidths(member, self.gains[self.name], widths)}
-        found = replaced(self.contracts, self.problem.assume, self.name, self.problem.subsystems(together)[self.name])
+        found = self._proved(member, together)
         if isinstance(found, Failure):
             return math.inf, Tuned(gains=together, contracts=replace(found, together=True), evaluations=1)
         good = violation(self.problem, found, together) == 0.0
         size = certified_error(self.problem, found) if good else math.inf
         return size, Tuned(gains=together, contracts=found, evaluations=1)
+
+    def _proved(self, member: Member, gains: GainSet) -> Contracts | Failure:
+        """The proofs with the member's new one."""
+        if self.problem.linked:
+            changed = self.problem.subsystems(gains)[self.name]
+            return replaced(self.contracts, self.problem.assume, self.name, changed)
+        one = certificate(member, gains[self.name], refine=True)
+        if isinstance(one, Failure):
+            return one
+        made = Contract(guarantee=None, reached=None, bounds=member.bounds, certificate=one)
+        return {m.name: made if m is member else self.contracts[m.name] for m in self.problem.members}

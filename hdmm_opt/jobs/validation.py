@@ -47,7 +47,7 @@ def validate(
     progress("scenarios")
     given = scenarios(problem)
     runs = tuple(zip(given, simulate(given), strict=True))
-    everything = [(s, m) for s, m in runs if within_assumptions(problem, s)]
+    everything = [(s, m) for s, m in runs if within_assumptions(problem, s, m)]
     worst = None
     if problem.study.validation.worst_case:
         progress("corners of the assumptions")
@@ -81,7 +81,7 @@ def shown_scenarios(loop: Loop, gains: GainSet) -> Validation:
     given = scenarios(loop.problem)
     shown = loop.figures([Run(gains=gains, scenario=s) for s in given])
     runs = tuple(zip(given, shown, strict=True))
-    inside = tuple(m for s, m in runs if within_assumptions(loop.problem, s))
+    inside = tuple(m for s, m in runs if within_assumptions(loop.problem, s, m))
     return Validation(runs=runs, worst=None, monte_carlo=None, inside=inside, integration_error=0.0, missed=())
 
 

@@ -128,7 +128,7 @@ def _urdf(name: str) -> str:
 
 def _check(section: Any) -> Iterator[RefusedKeyError]:
     elsewhere = ("parameters", "ratings", "limits", *STROKE.values())
-    yield from no_place(section, ("level", "locked", "least_lever_m_rad", *elsewhere), "arm")
+    yield from no_place(section, ("level", "locked", "least_lever_m_rad", "body", "shared", *elsewhere), "arm")
     if section.urdf is None:
         yield RefusedKeyError("urdf", 'is required with model = "arm"', 'give a bundled name ("crane") or a path')
     if not section.joints:

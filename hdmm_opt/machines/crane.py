@@ -68,7 +68,7 @@ def _members(section: Any) -> tuple[str, ...]:
 
 
 def _check(section: Any) -> Iterator[RefusedKeyError]:
-    yield from no_place(section, ("urdf", "tip_m", "damping"), "crane")
+    yield from no_place(section, ("urdf", "tip_m", "damping", "body", "shared"), "crane")
     if section.level not in (None, "voltage"):
         yield RefusedKeyError("level", f'of the crane is "voltage": got {section.level!r}', "leave it out")
     known = {name: p for name, p in defaults("voltage").items() if name != "load_mass"}

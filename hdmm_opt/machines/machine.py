@@ -18,7 +18,8 @@ from stability import Expression, Interval, algebraic
 from stability.enclosures.translation import straight_line
 from stability.networks.coupling import Loads
 
-from ..plants import Plant
+from ..plants import Limit, Plant
+from .body import Body
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +27,7 @@ class Disturbance:
     """Something from outside that a study gives a range.
 
     Attributes:
-        name: Its name.
+        name: Its name; "member.name" where several members meet one each of the same range.
         unit: SI unit.
         course: "constant" in a run, or "any" course in time.
     """
@@ -34,6 +35,16 @@ class Disturbance:
     name: str
     unit: str
     course: Literal["constant", "any"]
+
+    @property
+    def kind(self) -> str:
+        """The name under which a study gives its range."""
+        return kind_of(self.name)
+
+
+def kind_of(name: str) -> str:
+    """The name of a disturbance without the member that meets it."""
+    return name.rpartition(".")[2]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,9 +55,10 @@ class Machine:
         name: Model name, as in a study.
         members: Names of the members.
         plants: The plant of each.
-        disturbances: What the machine meets; without a coupling the disturbances of its only plant.
-        forces: CasADi function (x, v, a, d) -> what the coupling asks of each member, shape (n,); None where there is
-            no coupling. x, v and a are the members' position, speed and acceleration, d the disturbances in order.
+        disturbances: What the machine meets; without a coupling what each plant meets by itself.
+        forces: CasADi function (x, v, a, d) -> what the coupling asks of each member, shape (n,); x, v and a are the
+            members' position, speed and acceleration, d the disturbances in order. None where nothing joins the
+            members, whose first states are then the output.
         place: CasADi function x -> output, m, of the members' first states.
         planner: How `motions` makes references for it.
         assumed: What has no public source, beside the parameters that say so.
@@ -54,6 +66,8 @@ class Machine:
         of_joints: CasADi function joint coordinates -> the members' first states; None where they are the same.
         sticks: CasADi function of the members' first states -> points of a stick figure, m. Shape (3, k).
         bundled: Numbers of each member that the study leaves to the bundled machine.
+        body: What free members move, in simulation.
+        shared: What members draw on together, by the output of each that adds up: a limit on the sum of its amounts.
     """
 
     name: str
@@ -68,6 +82,8 @@ class Machine:
     of_joints: Any = None
     sticks: Any = None
     bundled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    body: Body | None = None
+    shared: Mapping[str, Limit] = field(default_factory=dict)
 
     @property
     def own(self) -> tuple[float, ...]:
@@ -75,9 +91,20 @@ class Machine:
         return tuple(plant.parameters[plant.carried].value for plant in self.plants)
 
     @property
+    def free(self) -> bool:
+        """Whether nothing joins the members: each is by itself, and the machine's error is that of the worst one."""
+        return self.forces is None
+
+    @property
     def output_unit(self) -> str:
-        """Unit of the output: a length, or that of the first state where there is one member by itself."""
-        return self.plants[0].state_units[0] if self.forces is None else "m"
+        """Unit of the output: a length, or that of the first states where nothing joins the members."""
+        return self.plants[0].state_units[0] if self.free else "m"
+
+    def met_by(self, k: int) -> list[int]:
+        """Indices of the disturbances that a member of a free machine meets, in the order of its plant."""
+        own = f"{self.members[k]}." if len(self.members) > 1 else ""
+        names = [d.name for d in self.disturbances]
+        return [names.index(own + name) for name in self.plants[k].disturbances]
 
     @cached_property
     def expression(self) -> Expression:

@@ -116,7 +116,7 @@ def numbers_of(plant: Plant, given: Numbers) -> Plant:
 
 def check_parameters(
     where: str, parameters: Mapping[str, Any], known: Mapping[str, Parameter], what: str,
-    plant: Plant,
+    plant: Plant | None,
 ) -> Iterator[RefusedKeyError]:  # fmt: skip
     """Parameters that a plant does not have, in other units, or of the wrong sign.
 
@@ -125,11 +125,11 @@ def check_parameters(
         parameters: Its entries.
         known: The parameters of the plant.
         what: The plant, for messages.
-        plant: The plant with any numbers, for names that belong in another section.
+        plant: The plant with any numbers, for names that belong in another section; None for what is no plant.
     """
     for name, p in parameters.items():
         if name not in known or name == EFFECTIVENESS:
-            elsewhere = _elsewhere(name, plant)
+            elsewhere = "" if plant is None else _elsewhere(name, plant)
             if elsewhere not in ("", "parameters"):
                 rule = f"is not a parameter of {what}, but one of its {elsewhere}"
                 yield RefusedKeyError(f"{where}.{name}", rule, f"write plant.{elsewhere}.{name}")

@@ -7,8 +7,8 @@ from ..errors import RefusedKeyError
 from ..names import nearest
 from ..plants.own import own_name, own_plant
 from ..plants.registry import plant_model, plant_names
+from .free import free
 from .model import Model
-from .single import single
 
 
 def model(name: str) -> Model:
@@ -25,7 +25,7 @@ def model(name: str) -> Model:
         raise RefusedKeyError("model", f"is code of your own: got {name[:60]!r}", "--allow-code runs it")
     if plant is None:
         raise RefusedKeyError("model", f"is unknown: got {name[:40]!r}", nearest(name, model_names()))
-    return single(name, plant)
+    return free(name, plant)
 
 
 def model_names() -> list[str]:

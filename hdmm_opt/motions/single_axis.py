@@ -1,8 +1,9 @@
-"""Moves of one actuator that respect its limits for all t."""
+"""Moves of actuators that nothing joins, each inside its limits for all t."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -33,11 +34,11 @@ from .enclosure import enclosure
 
 
 def axis_moves(study: Study, machine: Machine) -> list[list[Spline]]:
-    """Moves of one actuator inside its limits.
+    """Moves of each actuator by itself inside its limits.
 
     Args:
         study: The study.
-        machine: Its machine, of one member.
+        machine: Its machine, of members that nothing joins.
 
     Returns:
         The moves. Speed, acceleration, jerk and stroke hold for all t by control points, torque, current and voltage
@@ -46,27 +47,43 @@ def axis_moves(study: Study, machine: Machine) -> list[list[Spline]]:
     Raises:
         InvalidInputError: a move breaks a limit; the message names it and what would do.
     """
-    section, (plant,) = study.reference, machine.plants
+    section = study.reference
     if section.limits is None:
         raise InvalidInputError('"reference.limits" is required and missing; add it')
-    places, unit = [place[0] for place in section.waypoints], plant.state_units[0]
+    if len(machine.members) > 1 and not section.durations_s:
+        raise InvalidInputError(
+            "reference.durations_s is required where several members move together: their least times differ; list them"
+        )
+    own = []
+    for k, (name, plant) in enumerate(zip(machine.members, machine.plants, strict=True)):
+        places = [place[k] for place in section.waypoints]
+        own.append(_moves(study, section.limits, plant, places, f"{name}: " if len(machine.members) > 1 else ""))
+    return [list(together) for together in zip(*own, strict=True)]
+
+
+def _moves(
+    study: Study, limits: MotionLimitSection, plant: Plant, places: Sequence[float], where: str
+) -> list[Spline]:  # fmt: skip
+    unit = plant.state_units[0]
     room = min(min(places) - plant.stroke[0], plant.stroke[1] - max(places))
     if not room > 0:
         raise InvalidInputError(
-            f"reference: waypoints lie inside the stroke, {plant.stroke[0]:g} to {plant.stroke[1]:g} {unit}, with room "
-            f"for the tracking error: got {min(places):g} to {max(places):g} {unit}; move them inwards"
+            f"reference: {where}waypoints lie inside the stroke, {plant.stroke[0]:g} to {plant.stroke[1]:g} {unit}, "
+            f"with room for the tracking error: got {min(places):g} to {max(places):g} {unit}; move them inwards"
         )
     moves = []
     for k, (start, goal) in enumerate(pairwise(places)):
         try:
-            moves.append([_move(study, section.limits, plant, k, start, goal)])
+            moves.append(_move(study, limits, plant, k, start, goal))
         except LimitViolatedError as error:
-            raise InvalidInputError(f"reference: move {k + 1} cannot be reached: {error}") from None
+            raise InvalidInputError(f"reference: {where}move {k + 1} cannot be reached: {error}") from None
     return moves
 
 
 def _move(study: Study, limits: MotionLimitSection, plant: Plant, k: int, start: float, goal: float) -> Spline:
     section = study.reference
+    if start == goal:  # it rests while others move
+        return quintic(start, goal, 0.0, section.durations_s[k])
     task = _task(study, limits, plant, k, start, goal)
     if section.kind == "bspline":
         return solve(task, 0.0).spline.coordinate(0)

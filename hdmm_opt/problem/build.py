@@ -73,7 +73,7 @@ def assemble(study: Study, references: tuple[Reference, ...] | None = None) -> P
     references = made_references(study, machine) if references is None else references
     slices = sliced(references)
     spans = {name: Interval(*d.range) for name, d in study.uncertainty.disturbances.items()}
-    if machine.forces is not None:
+    if not machine.free:
         machine = machine.carrying(_carried(machine, slices, [spans[d.name].high for d in machine.disturbances]))
     loads = machine.loads(spans)
     foreseen = loads.feedforward(slices) if loads is not None else None

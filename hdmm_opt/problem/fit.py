@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+
 from stability.loops.stack import MAX_DELAY
 from trajectories import Reference
 
 from ..errors import InvalidInputError
-from ..machines.machine import Machine
+from ..machines.body import ground_at
+from ..machines.machine import Machine, kind_of
 from ..names import nearest
 from ..plants import Plant
 from ..study import Study
+from ..study.validation import ScenarioSection
 from .member import GainRange
 
 _SUFFIX = {"m": "m", "m/s": "m_s", "N m": "nm", "A": "a", "rad": "rad", "rad/s": "rad_s", "N": "n", "Pa": "pa"}
@@ -19,12 +23,12 @@ _SUFFIX = {"m": "m", "m/s": "m_s", "N m": "nm", "A": "a", "rad": "rad", "rad/s":
 
 def check_disturbances(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
     """The study's disturbances are those of the machine."""
-    given, known = study.uncertainty.disturbances, [d.name for d in machine.disturbances]
+    kinds = {d.kind: d for d in machine.disturbances}
+    given, known = study.uncertainty.disturbances, list(kinds)
     for name in given:
         if name not in known:
             yield InvalidInputError(f'unknown key "uncertainty.disturbances.{name}"; {nearest(name, known)}')
-    for disturbance in machine.disturbances:
-        name = disturbance.name
+    for name, disturbance in kinds.items():
         if name not in given and set(given) <= set(known):
             yield InvalidInputError(f'"uncertainty.disturbances.{name}" is required and missing; give its range')
         if name not in given:
@@ -35,11 +39,11 @@ def check_disturbances(study: Study, machine: Machine) -> Iterator[InvalidInputE
                 f'uncertainty.disturbances.{name}.unit must be "{disturbance.unit}": got "{given[name].unit}"; '
                 "convert the range"
             )
-        if machine.forces is None and low == high:
+        if machine.free and low == high:
             yield InvalidInputError(
                 f"uncertainty.disturbances.{name} is an empty range: got [{low:g}, {high:g}]; widen it"
             )
-        if machine.forces is not None and given[name].rate is not None:
+        if not machine.free and given[name].rate is not None:
             yield InvalidInputError(
                 f"uncertainty.disturbances.{name}.rate has no meaning here: {name} is constant in a run; remove it"
             )
@@ -55,14 +59,18 @@ def check_scenarios(study: Study, machine: Machine) -> Iterator[InvalidInputErro
     known = {key for _, plant in pairs for key in plant.parameters}
     known |= {f"{name}.{key}" for name, plant in pairs for key in plant.parameters}
     constants = {d.name for d in machine.disturbances if d.course == "constant"}
+    met = {name for d in machine.disturbances for name in (d.name, d.kind)}
     for scenario in study.validation.scenarios:
         where = f"validation.scenarios.{scenario.name}"
         for name in scenario.parameters:
             if name not in known:
                 yield InvalidInputError(f"{where}.parameters.{name} is unknown; {nearest(name, sorted(known))}")
         for name, course in scenario.disturbances.items():
+            if name not in met:
+                yield InvalidInputError(f"{where}.disturbances.{name} is unknown; {nearest(name, sorted(met))}")
             if name in constants and len({value for _, value in course}) > 1:
                 yield InvalidInputError(f"{where}.disturbances.{name} is constant in a run; give one number")
+        yield from _check_ground(f"{where}.ground", scenario, machine)
         for name, plant in pairs:
             stuck = scenario.faults[name].stuck if name in scenario.faults else ()
             if len(stuck) > len(plant.inputs):
@@ -70,6 +78,36 @@ def check_scenarios(study: Study, machine: Machine) -> Iterator[InvalidInputErro
                     f"{where}.faults.{name}.stuck has at most one entry for each of "
                     f"{', '.join(plant.inputs)}: got {len(stuck)}; remove what is too much"
                 )
+
+
+def _check_ground(where: str, scenario: ScenarioSection, machine: Machine) -> Iterator[InvalidInputError]:
+    """The ground's signals are those of the machine's body, which makes the disturbances that follow from them."""
+    if scenario.ground is None:
+        return
+    if machine.body is None:
+        yield InvalidInputError(f"{where} has no place here: {machine.name} has no body that moves over it; remove it")
+        return
+    body = machine.body
+    known = {name: signal for signal in body.signals for name in (signal.name, kind_of(signal.name))}
+    good = True
+    for name, course in scenario.ground.items():
+        if name not in known:
+            good = False
+            yield InvalidInputError(f"{where}.{name} is unknown; {nearest(name, sorted(known))}")
+            continue
+        low, high = known[name].range
+        outside = [value for _, value in course if not low <= value <= high]
+        if outside:
+            good = False
+            yield InvalidInputError(f"{where}.{name} is from {low:g} to {high:g}: got {outside[0]:g}; correct it")
+    made = {kind for name in body.met for kind in (name, kind_of(name))}
+    for name in sorted(made & set(scenario.disturbances)):
+        yield InvalidInputError(f"{where} makes {name} itself: it has a course in disturbances too; remove one")
+    for time in sorted({t for course in scenario.ground.values() for t, _ in course} | {0.0}) if good else ():
+        told = body.holds([float(value) for value in ground_at(body, scenario.ground, np.array([time]))[:, 0]])
+        if told:
+            yield InvalidInputError(f"{where}: at {time:g} s the ground {told}; give more grip or less slope")
+            return
 
 
 def check_rates(study: Study, machine: Machine) -> Iterator[InvalidInputError]:

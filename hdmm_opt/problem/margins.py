@@ -10,10 +10,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from stability import Failure, Impulse, tangents_many
+from stability import Failure, Impulse, Interval, enclose, tangents_many
 from stability.certificates.certificate import Certificate
 from stability.networks.contracts import Contract
 
+from ..plants.sound import program_of
 from .member import Member
 from .problem import Contracts, GainSet, Problem
 
@@ -98,13 +99,34 @@ def margins(problem: Problem, contracts: Mapping[str, Contract]) -> list[Margin]
     made = []
     for member in problem.members:
         made += member_margins(member, contracts[member.name].certificate, shown=several)
-    if problem.loads is not None:
+    made += [_drawn(problem, contracts, output) for output in problem.machine.shared]
+    if problem.loads is not None or several:
         ultimates = np.array([contracts[member.name].certificate.ultimate[0] for member in problem.members])
         made.append(Margin(
             member="", name="output error", kind="error", certified=output_bound(problem, ultimates),
-            limit=problem.study.requirements.tracking_error_m, unit="m",
+            limit=problem.study.requirements.tracking_error_m, unit=problem.machine.output_unit,
         ))  # fmt: skip
     return made
+
+
+def of_machine(problem: Problem) -> int:
+    """How many of the margins are the machine's own, beside those of its members."""
+    return len(problem.machine.shared) + (problem.loads is not None or len(problem.members) > 1)
+
+
+def _drawn(problem: Problem, contracts: Mapping[str, Contract], output: str) -> Margin:
+    """What all members together take of something over their certified sets."""
+    limit, total = problem.machine.shared[output], 0.0
+    for member in problem.members:
+        plant, found = member.plant, contracts[member.name].certificate
+        program, _ = program_of(plant, plant.outputs[output])
+        assert program is not None
+        sizes = dict(zip(plant.inputs, found.effort, strict=True)) | dict(zip(plant.states, found.states, strict=True))
+        ranges = {name: Interval.symmetric(float(size)) for name, size in sizes.items()}
+        total += enclose(program, {**member.bounds.parameters, **ranges})[0].magnitude
+    return Margin(
+        member="", name=f"{output} of all members", kind="limit", certified=total, limit=limit.value, unit=limit.unit
+    )
 
 
 def certified_error(problem: Problem, contracts: Mapping[str, Contract]) -> float:
@@ -129,9 +151,12 @@ def violation(problem: Problem, contracts: Contracts | Failure, gains: GainSet) 
 
 
 def output_bound(problem: Problem, half_widths: Array) -> float:
-    """Bound on the distance of the output from its reference while |x_i - r_i| <= half_widths_i, m."""
+    """Bound on the distance of the output from its reference while |x_i - r_i| <= half_widths_i, m.
+
+    Of members that nothing joins it is that of the worst one, in its unit.
+    """
     if problem.loads is None:
-        return float(half_widths[0])
+        return float(max(half_widths))
     low, high = problem.slices.low[0], problem.slices.high[0]
     ranges = {f"x{j}": (low[j] - radius, high[j] + radius) for j, radius in enumerate(half_widths)}
     unit = np.ones(problem.slices.low.shape[2])

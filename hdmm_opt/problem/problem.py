@@ -12,7 +12,7 @@ from stability import Bounds, Interval
 from stability.networks.contracts import Contract, Subsystem
 from stability.networks.coupling import Loads, Slices, Tube
 
-from ..machines.machine import Machine
+from ..machines.machine import Machine, kind_of
 from ..study import Study
 from .member import Member, Values
 
@@ -67,7 +67,16 @@ class Problem:
     @property
     def searched(self) -> int:
         """Number of gains that are not fixed."""
-        return sum(len(member.searched) for member in self.members)
+        return sum(len(group[0].searched) for group in self.groups)
+
+    @property
+    def groups(self) -> list[list[Member]]:
+        """Members that share what is searched: those that nothing joins and that have the same ranges of gains."""
+        found: dict[object, list[Member]] = {}
+        for k, member in enumerate(self.members):
+            key = tuple(member.ranges[i] for i in member.searched) if self.machine.free else k
+            found.setdefault(key, []).append(member)
+        return list(found.values())
 
     def member(self, name: str) -> Member:
         """A member by its name."""
@@ -79,24 +88,25 @@ class Problem:
 
     def disturbance(self, name: str) -> Interval:
         """The assumed range of one of the machine's disturbances."""
-        return Interval(*self.study.uncertainty.disturbances[name].range)
+        return Interval(*self.study.uncertainty.disturbances[kind_of(name)].range)
 
     def rate_of(self, name: str) -> float | None:
         """The assumed bound on the rate of one of the machine's disturbances; None where it may change at any rate."""
-        return self.study.uncertainty.disturbances[name].rate
+        return self.study.uncertainty.disturbances[kind_of(name)].rate
 
     def at(self, point: Array, *, digits: int = 4) -> GainSet:
         """The gains at a point of the unit cube of all that is searched."""
-        found, first = {}, 0
-        for member in self.members:
-            size = len(member.searched)
-            found[member.name] = member.values(point[first : first + size], digits=digits)
-            first += size
-        return found
+        found: GainSet = {}
+        first = 0
+        for group in self.groups:
+            own = point[first : first + len(group[0].searched)]
+            found |= {member.name: member.values(own, digits=digits) for member in group}
+            first += len(own)
+        return {member.name: found[member.name] for member in self.members}
 
     def point(self, gains: GainSet) -> Array:
         """The point of that cube that stands for some gains."""
-        return np.concatenate([member.point(gains[member.name]) for member in self.members])
+        return np.concatenate([group[0].point(gains[group[0].name]) for group in self.groups])
 
     def subsystems(self, gains: GainSet) -> dict[str, Subsystem]:
         """The loops with given gains."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..machines.model import STROKE
-from ..plants import EFFECTIVENESS, Plant
+from ..plants import EFFECTIVENESS, Parameter, Plant
 from .build import by_state
 from .problem import Problem
 
@@ -22,6 +22,16 @@ def resolved(problem: Problem) -> dict[str, Any]:
     for key in STROKE.values():
         plant.pop(key, None)
     plant.pop("damping", None)  # it is a parameter of every joint
+    body = problem.machine.body
+    plant.pop("body")
+    plant.pop("shared")
+    if problem.machine.shared:
+        plant["shared"] = {
+            output: {"value": limit.value, "unit": limit.unit, "source": limit.source}
+            for output, limit in problem.machine.shared.items()
+        }
+    if body is not None:
+        plant["body"] = {name: _number(p) for name, p in body.parameters.items()}
     several = {member.name: member for member in problem.members}
     plant["joints"] = {name: _numbers(name, member.plant, problem) for name, member in several.items()}
     data["reference"] |= {"coordinates": "members", "waypoints": _waypoints(problem)}
@@ -45,7 +55,7 @@ def resolved(problem: Problem) -> dict[str, Any]:
     if not any(uncertainty["resolution"].values()):
         del uncertainty["resolution"]
     for disturbance in problem.machine.disturbances:
-        uncertainty["disturbances"][disturbance.name] |= {"course": disturbance.course, "unit": disturbance.unit}
+        uncertainty["disturbances"][disturbance.kind] |= {"course": disturbance.course, "unit": disturbance.unit}
     return data
 
 
@@ -57,6 +67,10 @@ def _waypoints(problem: Problem) -> list[list[float]]:
     return [[float(v) for v in np.array(problem.machine.of_joints(place)).ravel()] for place in section.waypoints]
 
 
+def _number(p: Parameter) -> dict[str, Any]:
+    return {"value": p.value, "unit": p.unit, "tolerance": p.tolerance, "source": p.source, "meaning": p.meaning}
+
+
 def _numbers(name: str, plant: Plant, problem: Problem) -> dict[str, Any]:
     """Parameters, limits, stroke and effectiveness of a plant, as a study gives them.
 
@@ -65,7 +79,7 @@ def _numbers(name: str, plant: Plant, problem: Problem) -> dict[str, Any]:
     left_out = {EFFECTIVENESS, *([plant.carried] if problem.loads is not None else [])}
     data: dict[str, Any] = {
         "parameters": {
-            name: {"value": p.value, "unit": p.unit, "tolerance": p.tolerance, "source": p.source, "meaning": p.meaning}
+            name: _number(p)
             for name, p in plant.parameters.items() if name not in left_out
         },
         "limits": {

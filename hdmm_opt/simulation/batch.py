@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from stability.loops.model import BALANCE, CONSTANT, balance_of
 
 from ..control.law import step_function
-from ..problem import GainSet, Member, Problem
+from ..machines.body import ground_at
+from ..problem import GainSet, Problem
 from .engine.engine import Batch
 from .layout import Part, size_of
-from .scenario import SOUND, Scenario, course_at
+from .scenario import SOUND, Course, Scenario, course_at
 
 Array = NDArray[np.float64]
 
@@ -82,13 +83,23 @@ class Batches:
         fixed = np.array([self._constants(run) for run in runs]).T
         names = [d.name for d in self.problem.machine.disturbances]
         t = self.times(shared.shape[0])
-        courses = [[run.scenario.disturbances.get(name, self._middle(name)) for name in names] for run in runs]
+        courses = [[self._course(run.scenario, name) for name in names] for run in runs]
+        body = self.problem.machine.body
+
+        def own(run: int, first: int, size: int) -> Array:
+            now, ground = t[first : first + size], runs[run].scenario.ground
+            met = np.stack([course_at(course, now) for course in courses[run]])
+            return met if ground is None or body is None else np.vstack([met, ground_at(body, ground, now)])
+
         x, z = self.starts(fixed, [run.scenario for run in runs])
         return Batch(
             fixed=fixed, seeds=np.array([seed_of(run.scenario.seed) for run in runs], dtype=np.uint64), x=x, z=z,
-            shared=shared,
-            own=lambda run, first, size: np.stack([course_at(c, t[first : first + size]) for c in courses[run]]),
+            shared=shared, own=own,
         )  # fmt: skip
+
+    def _course(self, scenario: Scenario, name: str) -> Course:
+        """The course of a disturbance: its own, that of all of its kind, or the middle of its range."""
+        return scenario.course(name) or self._middle(name)
 
     def _middle(self, name: str) -> Any:
         span = self.problem.disturbance(name)
@@ -117,8 +128,10 @@ class Batches:
         Every member starts nearest to rest inside its assumed initial errors; the scenario places the first one.
         """
         first, lanes = self.shared()[0], fixed.shape[1]
-        x = np.zeros((size_of(self.parts, "x"), lanes))
+        bodies = self._bodies(scenarios)
+        x = np.vstack([np.zeros((size_of(self.parts, "x"), lanes)), bodies])
         z = np.zeros((size_of(self.parts, "z"), lanes))
+        asked = self._asked(scenarios, bodies)
         shares = np.array([scenario.initial for scenario in scenarios])
         n = len(self.parts)
         for k, (part, member) in enumerate(zip(self.parts, self.problem.members, strict=True)):
@@ -131,7 +144,7 @@ class Batches:
             constants = part.constants(fixed)
             gains = constants["gains"]
             reference = np.repeat(r[:, None], lanes, axis=1)
-            acting = self._acting(member, scenarios)
+            acting = self._acting(k, scenarios, asked)
             for i in range(1, len(own)):
                 target = self._targets(k, own, reference, gains, load, acting, constants["parameters"])[i]
                 own[i] = target + np.clip(-target, -initial[i], initial[i])
@@ -147,7 +160,7 @@ class Batches:
             if part.waiting:
                 commands = self._first_commands(k, seen, reference, discrete["law"], gains, load)
                 discrete["pending"][:] = np.tile(commands, (part.waiting + part.early, 1))
-        return x, z
+        return x, np.vstack([z, asked, asked])
 
     def _first_commands(self, k: int, x: Array, r: Array, z: Array, gains: Array, load: Sequence[float]) -> Array:
         """The first input of each run without measurement errors: it acts until the first one has passed its delay."""
@@ -157,21 +170,44 @@ class Batches:
         step, lanes = self._steps[k], x.shape[1]
         return np.array(step.map(lanes)(x, r, z, gains, *(np.tile(v, (lanes, 1)).T for v in (nominal, list(load))))[0])
 
-    def _acting(self, member: Member, scenarios: Sequence[Scenario]) -> Array:
+    def _bodies(self, scenarios: Sequence[Scenario]) -> Array:
+        """The states of the body in which each run begins. Shape (b, lanes), (0, lanes) without one."""
+        body, now = self.problem.machine.body, np.zeros(1)
+        if body is None or scenarios[0].ground is None:
+            return np.zeros((0, len(scenarios)))
+        speeds = [float(self.shared()[0][4 * k]) for k in range(len(self.parts))]
+        return np.array([
+            body.start(speeds, [float(v) for v in ground_at(body, s.ground or {}, now)[:, 0]]) for s in scenarios
+        ]).T  # fmt: skip
+
+    def _acting(self, k: int, scenarios: Sequence[Scenario], asked: Array) -> Array:
         """The disturbances that a member's targets read, at the first instant; the middles of those that jump.
 
         Shape (w, lanes).
         """
+        member, machine = self.problem.members[k], self.problem.machine
         names = member.plant.disturbances
         read = {name.partition("/")[0] for row in member.model.rows for name in row.place}
         read |= set(names) if member.model.balanced else set()
         found = np.zeros((len(names), len(scenarios)))
-        for k, name in enumerate(names):
+        for j, name in enumerate(names):
             if name in read:
-                middle, jumps = self._middle(name), self.problem.rate_of(name) is None
-                courses = (middle if jumps else s.disturbances.get(name, middle) for s in scenarios)
-                found[k] = [course_at(course, np.zeros(1))[0] for course in courses]
+                full = machine.disturbances[machine.met_by(k)[j]].name if machine.free else name
+                jumps = self.problem.rate_of(name) is None
+                courses = (self._middle(name) if jumps else self._course(s, full) for s in scenarios)
+                found[j] = [course_at(course, np.zeros(1))[0] for course in courses]
+                if len(asked) and machine.body is not None and full in machine.body.met:
+                    found[j] = asked[machine.body.met.index(full)]
         return found
+
+    def _asked(self, scenarios: Sequence[Scenario], bodies: Array) -> Array:
+        """What the body asks of the members at the first instant. Shape (d, lanes), (0, lanes) without one."""
+        body = self.problem.machine.body
+        if body is None or not len(bodies):
+            return np.zeros((0, len(scenarios)))
+        speeds = [float(self.shared()[0][4 * k]) for k in range(len(self.parts))]
+        ground = [ground_at(body, s.ground or {}, np.zeros(1)) for s in scenarios]
+        return np.hstack([np.array(body.loads(own, speeds, g)) for own, g in zip(bodies.T, ground, strict=True)])
 
     def _targets(
         self, k: int, x: Array, r: Array, gains: Array, load: Sequence[float], acting: Array, p: Array

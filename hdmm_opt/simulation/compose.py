@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..control.observer import observed
+from ..machines.body import Body
 from ..problem import Problem
 from .acceleration import accelerations
 from .engine.system import System, Task
@@ -27,22 +28,38 @@ def compose(
         settings: What the figures are measured by.
         period: Duration of a tick, s.
         substeps: Runge-Kutta steps in a tick.
-        extras: What the runs need besides: "quantisation", "fault".
+        extras: What the runs need besides: "quantisation", "fault", "ground".
     """
     import casadi as ca
 
     machine, n = problem.machine, len(parts)
-    x, z = ca.SX.sym("x", size_of(parts, "x")), ca.SX.sym("z", size_of(parts, "z"))
+    body = machine.body if "ground" in extras else None
+    moved = ca.SX.sym("body", 0 if body is None else len(body.states))
+    watched = ca.SX.sym("watched", 0 if body is None else 2 * len(body.met))
+    x, z = ca.vertcat(ca.SX.sym("x", size_of(parts, "x")), moved), ca.SX.sym("z", size_of(parts, "z"))
     shared = ca.SX.sym("shared", (5 if problem.foreseeing else 4) * n)
-    own, draws = ca.SX.sym("own", len(machine.disturbances)), ca.SX.sym("draws", size_of(parts, "draws"))
+    ground = ca.SX.sym("ground", 0 if body is None else len(body.signals))
+    courses, draws = ca.SX.sym("own", len(machine.disturbances)), ca.SX.sym("draws", size_of(parts, "draws"))
+    own = ca.vertcat(courses, ground)
     fixed, t, tau = ca.SX.sym("fixed", size_of(parts, "fixed")), ca.SX.sym("t"), ca.SX.sym("tau")
     r = [shared[4 * i : 4 * i + 4] for i in range(n)]
     states = [x[part.x] for part in parts]
     discrete = [part.discrete(z) for part in parts]
     constants = [part.constants(fixed) for part in parts]
     foreseen = [shared[4 * n + i] if problem.foreseeing else None for i in range(n)]
-    tasks = _tasks(problem, parts, states, discrete, constants, draws, r, foreseen, z, t, extras)
-    rates = _rates(problem, parts, states, discrete, constants, own, r)
+    tasks = [
+        Task(every=task.every, after=ca.vertcat(task.after, watched))
+        for task in _tasks(problem, parts, states, discrete, constants, draws, r, foreseen, z, t, extras)
+    ]
+    met, use = courses, None
+    if body is not None:
+        firsts = ca.vertcat(*(state[0] for state in states))
+        asked, names = body.loads(moved, firsts, ground), [d.name for d in machine.disturbances]
+        met = ca.vertcat(*(asked[body.met.index(n)] if n in body.met else courses[k] for k, n in enumerate(names)))
+        tasks.append(Task(every=1, after=ca.vertcat(z, asked, watched[: len(body.met)])))
+        use = _use(problem, body, watched, period)
+    rates = _rates(problem, parts, states, discrete, constants, met, r)
+    rates += [body.rate(moved, firsts, ground)] if body is not None else []
     errors = [states[i][0] - _taylor(r[i], tau) for i in range(n)]
     place = machine.place(ca.vertcat(*(part[0] for part in states)))
     wanted = machine.place(ca.vertcat(*(_taylor(r[i], tau) for i in range(n))))
@@ -53,23 +70,40 @@ def compose(
     signals = Signals(
         states=states, errors=errors, commanded=[d["commanded"] for d in discrete], outputs=outputs,
         travels=[d["travel"] for d in discrete], estimates=[d["observer"] for d in discrete],
-        apart=_distance(place - wanted), t=t, tau=tau,
+        apart=_distance(place - wanted, free=machine.free), met_use=use, t=t, tau=tau,
     )  # fmt: skip
-    shown: dict[str, Any] = {"x": x, "place": place, "wanted": wanted}
+    shown: dict[str, Any] = {"x": x, "place": place, "wanted": wanted, "met": met}
+    if body is not None:
+        shown["body"] = ca.vertcat(moved, body.outputs(moved, firsts, ground))
     for key in ("law", "commanded", "errors"):
         shown[key] = ca.vertcat(*(d[key] for d in discrete))
     shown["outputs"] = ca.vertcat(*(value for column in outputs for value in column.values()))
     return System(
-        x=x, z=z, shared=shared, own=own, draws=draws, fixed=fixed, t=t, tau=tau, tasks=tasks,
+        x=x, z=ca.vertcat(z, watched), shared=shared, own=own, draws=draws, fixed=fixed, t=t, tau=tau,
+        tasks=tuple(tasks),
         rate=ca.vertcat(*rates), alive=alive, records=records(problem, parts, settings, signals), signals=shown,
         period=period, substeps=substeps,
     )  # fmt: skip
 
 
-def _distance(away: Any) -> Any:
+def _use(problem: Problem, body: Body, watched: Any, period: float) -> Any:
+    """The largest share of an assumed range or rate that the body's loads take, at a tick and since the one before."""
     import casadi as ca
 
-    return ca.fabs(away) if away.numel() == 1 else ca.norm_2(away)
+    use, count = ca.SX(0), len(body.met)
+    for k, name in enumerate(body.met):
+        span, rate = problem.disturbance(name), problem.rate_of(name)
+        middle, half = (span.low + span.high) / 2, (span.high - span.low) / 2
+        use = ca.fmax(use, ca.fabs(watched[k] - middle) / half)
+        if rate is not None:
+            use = ca.fmax(use, ca.fabs(watched[k] - watched[count + k]) / (rate * period))
+    return use
+
+
+def _distance(away: Any, *, free: bool) -> Any:
+    import casadi as ca
+
+    return ca.mmax(ca.fabs(away)) if free else ca.norm_2(away) if away.numel() > 1 else ca.fabs(away)
 
 
 def _taylor(r: Any, tau: Any) -> Any:
@@ -94,8 +128,10 @@ def _rates(
 
     machine = problem.machine
     inputs, parameters = [d["applied"] for d in discrete], [c["parameters"] for c in constants]
-    loads, gained = [own] * len(parts), None
-    if machine.forces is not None:
+    gained = None
+    if machine.free:
+        loads = [own[machine.met_by(i)] for i in range(len(parts))]
+    else:
         guess = ca.vertcat(*(r[i][2 if p.law.plant.first == "position" else 1] for i, p in enumerate(parts)))
         gained, load = accelerations(machine, states, inputs, parameters, own, guess)
         loads = [load[i] for i in range(len(parts))]

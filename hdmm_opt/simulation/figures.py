@@ -57,6 +57,8 @@ class Figures:
         diverged_s: Time at which the run was lost, s; infinite for a sound one. A run is lost where a value is not
             finite or a member is further than half a metre or radian from its reference.
         members: By name.
+        met_use: Largest share of an assumed range or rate that the loads of a body took: beyond 1 a run is outside the
+            assumptions; None where all disturbances had courses.
     """
 
     maximum_error_m: float
@@ -67,6 +69,7 @@ class Figures:
     limit_use: float
     diverged_s: float
     members: Mapping[str, MemberFigures]
+    met_use: float | None = None
 
     @property
     def diverged(self) -> bool:
@@ -75,7 +78,10 @@ class Figures:
 
     def to_data(self) -> dict[str, Any]:
         """Figures as JSON data; what is not finite, in a run that was lost, is null."""
-        return plain(asdict(self))
+        data = plain(asdict(self))
+        if self.met_use is None:
+            del data["met_use"]
+        return data
 
 
 def plain(value: Any) -> Any:
@@ -117,6 +123,7 @@ def figures(
         limit_use=max(m.limit_use for m in members.values()),
         diverged_s=lost,
         members=members,
+        met_use=found.get("met use"),
     )
 
 

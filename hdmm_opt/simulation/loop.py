@@ -74,7 +74,7 @@ class Loop:
         return compose(self.problem, self.parts, self.settings, self.period, self.substeps(), extras)
 
     def engine(self, extras: frozenset[str]) -> Engine:
-        """The engine of the loop with what some scenarios need besides: "quantisation", "fault"."""
+        """The engine of the loop with what some scenarios need besides: "quantisation", "fault", "ground"."""
         if extras not in self._engines:
             self._engines[extras] = Engine(self.system(extras), compiled=self.compiled)
         return self._engines[extras]
@@ -136,12 +136,17 @@ class Loop:
                 r=batch.shared[:kept, 4 * k : 4 * k + 4].T,
                 outputs=dict(zip(names, own("outputs", len(names)), strict=True)),
             )  # fmt: skip
-        met = batch.own(0, 0, kept)
-        named = {d.name: met[i] for i, d in enumerate(self.problem.machine.disturbances)}
+        named = {d.name: signals["met"][i] for i, d in enumerate(self.problem.machine.disturbances)}
         return Trace(
             t=self.batches.times(kept), members=members, disturbances=named, place=signals["place"],
-            wanted=signals["wanted"], diverged_s=lost,
+            wanted=signals["wanted"], free=self.problem.machine.free, diverged_s=lost,
+            body=self._body(signals.get("body")),
         )  # fmt: skip
+
+    def _body(self, rows: Array | None) -> dict[str, Array]:
+        """The signals of the machine's body by name."""
+        body = self.problem.machine.body
+        return {} if rows is None or body is None else dict(zip((*body.states, *body.output_names), rows, strict=True))
 
     def sensitivities(self, runs: Sequence[Run], directions: Array) -> tuple[list[Figures], Array, Array]:
         """Figures, and the derivatives of the output's RMS error and ITAE along directions of the gains.
@@ -219,5 +224,6 @@ class Loop:
     def _extras(self, scenario: Scenario) -> frozenset[str]:
         """What a run needs of the loop besides."""
         counted = any(step > 0 for part in self.parts for step in part.resolution)
-        wanted = {"quantisation": counted or scenario.quantisation > 0, "fault": bool(scenario.faults)}
+        wanted = {"quantisation": counted or scenario.quantisation > 0, "fault": bool(scenario.faults),
+                  "ground": scenario.ground is not None}  # fmt: skip
         return frozenset(name for name, needed in wanted.items() if needed)

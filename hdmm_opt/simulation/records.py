@@ -31,6 +31,7 @@ class Signals:
     Attributes:
         states, errors, commanded, outputs, travels, estimates: Of each member.
         apart: Distance of the output from its reference.
+        met_use: Share of the assumptions that a body's loads take; None without one.
         t, tau: Time of the tick and since the tick, s.
     """
 
@@ -41,6 +42,7 @@ class Signals:
     travels: list[Any]
     estimates: list[Any]
     apart: Any
+    met_use: Any
     t: Any
     tau: Any
 
@@ -58,6 +60,8 @@ def records(problem: Problem, parts: Sequence[Part], settings: Settings, signals
         Record(name="itae", kind="sum", value=signals.t * apart),
         Record(name="ever outside", kind="max", value=apart > settings.band),
     ]
+    if signals.met_use is not None:
+        found.append(Record(name="met use", kind="max", value=signals.met_use))
     for i, part in enumerate(parts):
         found += _of_member(part, signals, i, late)
         if part.observer is not None:

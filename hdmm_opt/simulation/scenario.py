@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..machines.machine import kind_of
 from ..plants import EFFECTIVENESS, Parameter, Plant, healthy
 from ..problem import Problem
+from .figures import Figures
 
 Array = NDArray[np.float64]
 #: Breakpoints (time in s, value), linear between them, constant outside.
@@ -54,7 +56,8 @@ class Scenario:
 
     Attributes:
         name: Name for reports.
-        disturbances: Course of each disturbance; the middle of its range where not named.
+        disturbances: Course of each disturbance, by "member.name" or by "name" for all members that meet one of their
+            own; the middle of its range where not named.
         parameters: Position of parameters in their tolerance, -1 … 1, by "member.parameter" or by "parameter" for all;
             nominal where not named, and actuators healthy.
         noise: Share of the assumed measurement errors, uniformly distributed, 0 … 1.
@@ -62,6 +65,8 @@ class Scenario:
         initial: Position of every member's first error in its assumed range, -1 … 1.
         quantisation: Share of the assumed measurement errors that is the rounding of an encoder, 0 … 1.
         faults: What goes wrong with the actuators, by member.
+        ground: Courses of the ground's signals under a machine with a body, which then makes disturbances of its own;
+            None where all disturbances have courses.
         seed: Seed of the noise.
     """
 
@@ -73,6 +78,7 @@ class Scenario:
     initial: float = 0.0
     quantisation: float = 0.0
     faults: Mapping[str, Fault] = field(default_factory=dict)
+    ground: Mapping[str, Course] | None = None
     seed: int = 0
 
     def parameter(self, member: str, name: str, parameter: Parameter) -> float:
@@ -80,22 +86,31 @@ class Scenario:
         usual = healthy(parameter) if name == EFFECTIVENESS else 0.0
         return parameter.at(self.parameters.get(f"{member}.{name}", self.parameters.get(name, usual)))
 
+    def course(self, name: str) -> Course | None:
+        """The course of a disturbance, by "member.name" or by "name" for all; None where it is not named."""
+        return self.disturbances.get(name) or self.disturbances.get(kind_of(name))
+
     def to_data(self) -> dict[str, Any]:
         """The scenario as JSON data."""
         data = asdict(self)
         data["disturbances"] = {name: [list(p) for p in course] for name, course in self.disturbances.items()}
         data["faults"] = {name: {**asdict(f), "stuck": list(f.stuck)} for name, f in self.faults.items()}
+        if self.ground is None:
+            del data["ground"]
+        else:
+            data["ground"] = {name: [list(p) for p in course] for name, course in self.ground.items()}
         return data
 
     @staticmethod
     def from_data(data: Mapping[str, Any]) -> Scenario:
         """The scenario that `to_data` came from."""
-        courses = {
-            name: tuple((float(t), float(value)) for t, value in course)
-            for name, course in data["disturbances"].items()
-        }
         faults = {name: Fault(**{**f, "stuck": tuple(f["stuck"])}) for name, f in data["faults"].items()}
-        return Scenario(**{**data, "disturbances": courses, "faults": faults})
+        courses = {key: _courses(data[key]) for key in ("disturbances", "ground") if data.get(key) is not None}
+        return Scenario(**{**data, "faults": faults, **courses})
+
+
+def _courses(data: Mapping[str, Any]) -> dict[str, Course]:
+    return {name: tuple((float(t), float(value)) for t, value in course) for name, course in data.items()}
 
 
 def scenarios(problem: Problem) -> list[Scenario]:
@@ -106,17 +121,19 @@ def scenarios(problem: Problem) -> list[Scenario]:
             name=s.name, disturbances=dict(s.disturbances), parameters=s.parameters, noise=s.noise, bias=s.bias,
             initial=s.initial, quantisation=s.quantisation,
             faults={name: Fault(**fault.model_dump()) for name, fault in s.faults.items()},
-            seed=study.tuning.seed + k,
+            ground=None if s.ground is None else dict(s.ground), seed=study.tuning.seed + k,
         )
         for k, s in enumerate(study.validation.scenarios)
     ]  # fmt: skip
 
 
-def within_assumptions(problem: Problem, scenario: Scenario) -> bool:
-    """Whether the assumptions of the proof hold a scenario.
+def within_assumptions(problem: Problem, scenario: Scenario, figures: Figures | None = None) -> bool:
+    """Whether the assumptions of the proof hold a scenario; what a body's loads were is known from its figures.
 
     Faults may only take effectiveness that is allowed for, and disturbances change no faster than the study says.
     """
+    if figures is not None and figures.met_use is not None and not figures.met_use <= 1:
+        return False
     if any(abs(share) > 1 for share in (*scenario.parameters.values(), scenario.initial)):
         return False
     for name, course in scenario.disturbances.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,9 +45,11 @@ class Trace:
         t: Times, s. Shape (k,).
         members: By name.
         disturbances: By name. Each shape (k,).
-        place: Output, m. Shape (d, k).
-        wanted: Its reference, m. Shape (d, k).
+        place: Output, m; of members that nothing joins their first states. Shape (d, k).
+        wanted: Its reference. Shape (d, k).
+        free: Whether nothing joins the members.
         diverged_s: Time at which the run was lost, s; infinite for a sound one. A lost run is shorter.
+        body: States and further signals of the body that the members move, by name. Each shape (k,).
     """
 
     t: Array
@@ -55,10 +57,15 @@ class Trace:
     disturbances: Mapping[str, Array]
     place: Array
     wanted: Array
+    free: bool
     diverged_s: float
+    body: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def error(self) -> Array:
-        """Distance of the output from its reference, m; with sign where the output is one coordinate. Shape (k,)."""
+        """Distance of the output from its reference, m; with sign where the output is one coordinate. Shape (k,).
+
+        Of members that nothing joins that of the worst one.
+        """
         away = self.place - self.wanted
-        return away[0] if len(away) == 1 else np.linalg.norm(away, axis=0)
+        return away[0] if len(away) == 1 else np.linalg.norm(away, ord=np.inf if self.free else 2, axis=0)

@@ -46,6 +46,8 @@ class PlantSection(NumberSection):
     least_lever_m_rad: Annotated[float, Field(gt=0, le=0.25)] | None = None
     joints: dict[Name, DriveSection] = Field(default_factory=dict)
     locked: dict[Name, float] = Field(default_factory=dict)
+    body: dict[str, ParameterSection] = Field(default_factory=dict)
+    shared: dict[str, LimitSection] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _fitting(self) -> PlantSection:

@@ -13,6 +13,8 @@ NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=-1, le=1)]
 Pair = tuple[float, float]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,31}$")]
+#: A name, or that of a member with a dot before it.
+Owned = Annotated[str, Field(pattern=r"^([A-Za-z][A-Za-z0-9_]{0,31}\.)?[A-Za-z][A-Za-z0-9_]{0,31}$")]
 
 #: Spans of a motion of one phase where a study gives none.
 SPANS = 36

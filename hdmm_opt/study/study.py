@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pydantic import model_validator
 
 from ..errors import RefusedKeyError
+from ..machines.machine import kind_of
 from ..machines.model import SINGLE
 from ..machines.registry import model
 from ..names import nearest
@@ -83,15 +84,15 @@ class Study(Section):
         ranges, unknown = self.uncertainty.disturbances, set()
         for scenario in self.validation.scenarios:
             for name, course in scenario.disturbances.items():
-                where = f"validation.scenarios.{scenario.name}.disturbances.{name}"
-                if name not in ranges and name in unknown:
+                where, kind = f"validation.scenarios.{scenario.name}.disturbances.{name}", kind_of(name)
+                if kind not in ranges and kind in unknown:
                     continue
-                if name not in ranges:
-                    unknown.add(name)
-                    yield RefusedKeyError(where, "is not a disturbance of the study", nearest(name, ranges))
+                if kind not in ranges:
+                    unknown.add(kind)
+                    yield RefusedKeyError(where, "is not a disturbance of the study", nearest(kind, ranges))
                     continue
-                low, high = ranges[name].range
+                low, high = ranges[kind].range
                 outside = [value for _, value in course if not low <= value <= high]
                 if outside and low < high:  # an empty range is refused where the machine is known
-                    rule = f"must stay inside uncertainty.disturbances.{name} [{low:g}, {high:g}]: got {outside[0]:g}"
+                    rule = f"must stay inside uncertainty.disturbances.{kind} [{low:g}, {high:g}]: got {outside[0]:g}"
                     yield RefusedKeyError(where, rule, "widen the assumption or change the scenario")

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, model_validator
 
 from .messages import refused
-from .sections import Name, NonNegative, Pair, Positive, Section, Share
+from .sections import Name, NonNegative, Owned, Pair, Positive, Section, Share
 
 #: Names of runs that are not the study's.
 RESERVED = ("worst-case", "witness")
@@ -61,22 +61,25 @@ class ScenarioSection(Section):
     """One simulated run."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
-    disturbances: dict[Name, Course] = Field(default_factory=dict)
+    disturbances: dict[Owned, Course] = Field(default_factory=dict)
     parameters: dict[str, Share] = Field(default_factory=dict)
     noise: Annotated[float, Field(ge=0, le=1)] = 0.0
     bias: Share = 0.0
     initial: Share = 0.0
     quantisation: Annotated[float, Field(ge=0, le=1)] = 0.0
     faults: dict[Name, FaultSection] = Field(default_factory=dict)
+    ground: dict[Owned, Course] | None = None
 
     @model_validator(mode="after")
     def _times(self) -> ScenarioSection:
-        for name, course in self.disturbances.items():
+        given = [(f"disturbances.{name}", course) for name, course in self.disturbances.items()]
+        given += [(f"ground.{name}", course) for name, course in (self.ground or {}).items()]
+        for name, course in given:
             times = [t for t, _ in course]
             if times[0] < 0:
-                raise refused(f"disturbances.{name}", f"needs times from 0 on: got {times[0]:g}", "correct it")
+                raise refused(name, f"needs times from 0 on: got {times[0]:g}", "correct it")
             if any(b <= a for a, b in pairwise(times)):
-                raise refused(f"disturbances.{name}", "needs increasing times", "sort them")
+                raise refused(name, "needs increasing times", "sort them")
         return self
 
 

@@ -32,6 +32,7 @@ from .member import Member, check_member
 from .obligation import Obligation, Report, above, downward, milli, percent, upward
 from .parsing import check_digests, number, parse, wrong_schema
 from .requirements import beyond_error
+from .shared import drawn_together
 from .statement import met
 
 
@@ -99,11 +100,12 @@ def check_machine(data: dict[str, Any], file: str, recorded: bool = True) -> Rep
     couplings = data["couplings"]
     need(isinstance(couplings, list) and len(couplings) <= 1, "a machine has one coupling, or none")
     need(all(entry["members"] == names for entry in couplings), "a coupling is of all members in their order")
-    need(len(names) == 1 or bool(couplings), "members without a coupling are files of their own")
     made: list[Obligation] = []
     WORK.begin(MAX_PRODUCTS)
     members = []
     for which in range(len(names)):
+        if not couplings:  # each is by itself, and costs what a file of its own would
+            WORK.begin(MAX_PRODUCTS)
         member = check_member(data, which, bool(couplings))
         made += member.made
         if member.failed:
@@ -122,11 +124,15 @@ def check_together(
         made.append(guarantees_kept(data, members))
     coupling = Coupling(data, data["couplings"][0], members) if data["couplings"] else None
     made += coupling.obligations() if coupling is not None else []
+    made += drawn_together(data, members)
     wrong = [o for o in made if o.verdict != "proved"]
     if wrong:
         text = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"
         return Report(file, 1, f"not proved: {text}", made)
-    proved = {"tracking_error_m": members[0].claim.ultimate[0] if coupling is None else coupling.stated}
+    units = {str(member.claim.rows[0]["unit"]) for member in members}
+    need(coupling is not None or len(units) == 1, "the first states of members without a coupling have one unit")
+    worst = max(member.claim.ultimate[0] for member in members)
+    proved = {"tracking_error_m": worst if coupling is None else coupling.stated}
     if len(members) > 1:
         proved |= {f"member_error.{m.name}": m.claim.ultimate[0] for m in members}
     proved |= beyond_error(data, members, coupling)
@@ -143,13 +149,14 @@ def check_together(
             raise
         records = str(error)
     reach = [member.claim.half_widths[0] for member in members]
-    inside = reach[0] if coupling is None else coupling.output(reach)
+    inside = max(reach) if coupling is None else coupling.output(reach)
     need(0 <= number(data["validation"]["largest_error_m"], "largest_error_m"), "an error must not be negative")
     if number(data["validation"]["largest_error_m"], "largest_error_m") > inside:
         return Report(file, 1, "not proved: the recorded simulation leaves the certified envelope", made)
-    settled, unit = upward(members[0].claim.transient, 6), str(members[0].claim.rows[0]["unit"])
-    bound = milli(proved["tracking_error_m"], unit if coupling is None else "m")
-    of = "" if coupling is None else f" of the output, all {len(members)} members together"
+    settled = upward(members[0].claim.transient, 6)
+    bound = milli(proved["tracking_error_m"], units.pop() if coupling is None else "m")
+    of = "" if len(members) == 1 else f" of each of {len(members)} members"
+    of = of if coupling is None else f" of the output, all {len(members)} members together"
     message = f"proved: |tracking error{of}| <= {bound} from {settled} s on"
     used = [use for member in members for use in member.used]
     return Report(file, 0, message, made, used, *unsourced(data), data["study"]["plant"]["model"], records, required)
@@ -165,6 +172,8 @@ def unsourced(data: dict[str, Any]) -> tuple[list[str], list[str]]:
         for kind, after in (("parameters", ""), ("ratings", ""), ("limits", " limit")):
             entries = section.get(kind, {}).items()
             assumed += [before + name + after for name, entry in entries if entry["source"] == "assumed"]
+    body = data["study"]["plant"].get("body", {}).items()
+    assumed += [f"body.{name}" for name, entry in body if entry["source"] == "assumed"]
     return bundled, assumed
 
 
@@ -229,10 +238,13 @@ def show(reports: list[Report], *, as_json: bool, verbose: bool = False) -> None
 def limit_lines(report: Report) -> list[str]:
     """What is certified of the limits, in lines of a terminal."""
     members = list(dict.fromkeys(use.member for use in report.uses))
-    lines = []
+    alike: dict[str, list[str]] = {}
     for member in members:
         shares = ", ".join(f"{u.name} {percent(u.share, up=True)}" for u in report.uses if u.member == member)
-        before = f"{member}: " if len(members) > 1 else ""
+        alike.setdefault(shares, []).append(member)
+    lines = []
+    for shares, own in alike.items():
+        before = f"{', '.join(own)}: " if len(members) > 1 else ""
         lines += wrapped(f"{before}of its limits at most: {shares}")
     return lines
 
@@ -250,8 +262,20 @@ def requirement_lines(report: Report) -> list[str]:
 def source_lines(report: Report) -> list[str]:
     """What the numbers rest on, in lines of a terminal."""
     whose = f"the defaults of {report.model}" if ".py" in report.model else f"of the bundled {report.model}"
-    lines = wrapped(f"still {whose}: {', '.join(report.bundled)}") if report.bundled else []
-    return lines + (wrapped(f"assumed: {', '.join(report.assumed)}") if report.assumed else [])
+    members = list(dict.fromkeys(use.member for use in report.uses))
+    lines = wrapped(f"still {whose}: {gathered(report.bundled, members)}") if report.bundled else []
+    return lines + (wrapped(f"assumed: {gathered(report.assumed, members)}") if report.assumed else [])
+
+
+def gathered(names: list[str], members: list[str]) -> str:
+    """Names of numbers, each once with the members in brackets that have it."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        owner, _, key = name.rpartition(".")
+        found.setdefault(key, []).append(owner)
+    return ", ".join(
+        key if own == [""] else f"{key} ({'all' if own == members else ', '.join(own)})" for key, own in found.items()
+    )
 
 
 def obligation_lines(report: Report, *, everything: bool) -> list[str]:

@@ -58,7 +58,7 @@ def follows(data: dict[str, Any], entry: dict[str, Any], claim: Claim, which: in
             need(lasted <= number(section["longest_s"], "longest_s") * (1 + MET), f"move {k + 1} lasts too long")
     lasted = number(segments[-1]["knots"][-1], "a knot")
     need(claim.transient < lasted, "the transient outlasts the reference")
-    _limited(section, claim, segments, which, count)
+    _limited(section, claim, segments, which, count if data["couplings"] else 1)
 
 
 def _of(segment: dict[str, Any]) -> tuple[list[Fraction], list[Fraction]]:

@@ -38,10 +38,10 @@ PAIR = listed(plain_number, 2, 2)
 TRIPLE = listed(plain_number, 3, 3)
 LIMIT = entry_of({"value": positive, "unit": unit, "source": SOURCE})
 STROKES = {key: PAIR for key in ("stroke_m", "stroke_rad", "stroke_m_s", "stroke_rad_s")}
+CONSTANT = entry_of({"value": plain_number, "unit": unit, "tolerance": plain_number, "source": SOURCE, "meaning": text})
 DRIVE = entry_of(
     {
-        "parameters": named(entry_of({"value": plain_number, "unit": unit, "tolerance": plain_number,
-                                      "source": SOURCE, "meaning": text})),
+        "parameters": named(CONSTANT),
         "limits": named(LIMIT),
     },
     {"ratings": named(LIMIT), "least_effectiveness": plain_number, "bundled": listed(text, 0, 64), **STROKES},
@@ -54,6 +54,7 @@ SCENARIO = {
     "name": text, "disturbances": named(COURSE), "parameters": named(plain_number), "noise": plain_number,
     "bias": plain_number, "initial": plain_number, "quantisation": plain_number, "faults": named(FAULT),
 }  # fmt: skip
+GROUND = {"ground": named(COURSE)}
 MOTION_LIMITS = entry_of(
     {},
     {**dict.fromkeys(("speed_m_s", "acceleration_m_s2", "jerk_m_s3"), plain_number),
@@ -70,7 +71,8 @@ STUDY = entry_of(
         "plant": entry_of(
             {"model": text, "parameters": NOTHING, "ratings": NOTHING, "limits": NOTHING,
              "joints": named(DRIVE, MAX_MEMBERS), "locked": named(plain_number)},
-            {"level": name, "sensor": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
+            {"body": named(CONSTANT), "shared": named(LIMIT),
+             "level": name, "sensor": name, "urdf": text, "tip_m": TRIPLE, "least_lever_m_rad": plain_number},
         ),
         "uncertainty": entry_of({
             "disturbances": named(entry_of({"range": PAIR, "course": some("constant", "any"), "unit": unit},
@@ -101,7 +103,7 @@ STUDY = entry_of(
             {"seconds": positive},
         ),
         "validation": entry_of({"transient_s": plain_number, "monte_carlo": whole, "falsify": whole,
-                                "worst_case": flag, "scenarios": listed(entry_of(SCENARIO), 1, 200)}),
+                                "worst_case": flag, "scenarios": listed(entry_of(SCENARIO, GROUND), 1, 200)}),
         "sha256": HASH,
     }
 )  # fmt: skip
@@ -167,12 +169,12 @@ FIGURES = entry_of({
                         RECORDED),
         "peaks": named(RECORDED), "rms": named(RECORDED), "estimates": listed(RECORDED, 0, 2),
     }, {"travel": RECORDED})),
-})  # fmt: skip
+}, {"met_use": RECORDED})  # fmt: skip
 VALIDATION = entry_of({
     "requirements": listed(entry_of({"name": text, "required": plain_number, "simulated": plain_number,
                                      "certified": maybe(plain_number)}), 1, 32),
     "scenarios": listed(entry_of({"name": text, "figures": FIGURES}), 1, 200),
-    "worst_case": maybe(entry_of({"scenario": entry_of({**SCENARIO, "seed": whole}), "figures": FIGURES})),
+    "worst_case": maybe(entry_of({"scenario": entry_of({**SCENARIO, "seed": whole}, GROUND), "figures": FIGURES})),
     "monte_carlo": maybe(entry_of({"runs": whole, "met": whole})),
     "simulated_runs": whole, "integration_error_m": plain_number, "largest_error_m": plain_number,
     "largest_error_after_transient_m": plain_number,

@@ -39,7 +39,8 @@ LEAST_EFFECT = Fraction(1, 10**9)
 LEAST_LOAD = Fraction(1, 10**4)
 #: A member moves the output by at least this much per unit of its position, m/m or m/rad.
 LEAST_SLOPE = 0.05
-#: Interval products that all members and the coupling of a machine may take; files of ours take up to half.
+#: Interval products that all members and the coupling of a machine may take, and each of members that nothing joins;
+#: files of ours take up to half.
 MAX_PRODUCTS, MAX_COUPLED = 200_000, 4_000_000
 #: Members of a machine, and slices of time that its motion may be cut into.
 MAX_MEMBERS, MAX_SLICES = 8, 1_000

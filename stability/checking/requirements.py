@@ -68,7 +68,7 @@ def _settled(data: dict[str, Any], members: list[Member], coupling: Coupling | N
 
     def inside(time: Fraction) -> bool:
         sizes = [member.verdict.sizes(time)[0] for member in members]
-        return (sizes[0] if coupling is None else coupling.output(sizes)) <= band
+        return (max(sizes) if coupling is None else coupling.output(sizes)) <= band
 
     if inside(Fraction(0)):
         return Fraction(0)
@@ -99,13 +99,24 @@ def _effort(
             return None, None
         if own[output][0] == unit:
             segments = entry["reference"]["segments"]
-            if sum(max(WHOLE_MOVE, len(segment["coefficients"])) for segment in segments) > MOST_SLICES:
+            if _count(segments) > MOST_SLICES:
                 return None, None
             parts = list(_slices(segments, member, own[output][1]))
             whole = sum((lasted for lasted, _ in parts), Fraction(0))
             peaks.append(max(square for _, square in parts))
             means.append(sum((lasted * square for lasted, square in parts), Fraction(0)) / whole)
     return (root(up(max(peaks)), True), root(up(max(means)), True)) if peaks else (None, None)
+
+
+def largest_of(entry: dict[str, Any], member: Member, program: dict[str, Any]) -> Fraction:
+    """A bound on the square of an output over the whole motion."""
+    segments = entry["reference"]["segments"]
+    need(_count(segments) <= MOST_SLICES, "an output is bounded over fewer slices of a motion")
+    return max(square for _, square in _slices(segments, member, program))
+
+
+def _count(segments: list[dict[str, Any]]) -> int:
+    return sum(max(WHOLE_MOVE, len(segment["coefficients"])) for segment in segments)
 
 
 def _slices(
