@@ -14,8 +14,8 @@ from ..problem import Problem, assemble
 from ..simulation import Scenario, scenarios
 from ..study import validated
 
-#: Parameters that stand for the gain of the plant and for the lag of its drive, and values that they are tried at.
-GAIN, LAG, SLOW = "torque_scale", "drive_lag", 1e-3
+#: The parameter that stands for the gain of the plant; lags of drives and valves, and how slow they are tried, s.
+GAIN, SLOW = "torque_scale", {"drive_lag": 1e-3, "valve_lag": 0.02}
 #: A rigid actuator, and the one with a spring in its screw that stands for it, the sensor at either side.
 RIGID, ELASTIC = ("pmsm_emla", "torque"), "elastic_emla"
 #: So many times the assumed initial error.
@@ -99,8 +99,8 @@ def _more(problem: Problem, seed: int) -> Iterator[Scenario]:
         for name, factor in (("half-gain", 0.5), ("double-gain", 2.0)):
             share = {GAIN: _position(plants[0].parameters[GAIN], factor * plants[0].parameters[GAIN].value)}
             yield Scenario(name=name, disturbances=high, parameters=share, noise=1.0, seed=seed + 2)
-    if all(LAG in plant.parameters for plant in plants):
-        share = {LAG: _position(plants[0].parameters[LAG], SLOW)}
+    for lag in [lag for lag in SLOW if all(lag in plant.parameters for plant in plants)]:
+        share = {lag: _position(plants[0].parameters[lag], SLOW[lag])}
         yield Scenario(name="slow-drive", disturbances=high, parameters=share, noise=1.0, seed=seed + 3)
 
 

@@ -16,8 +16,8 @@ from tuning import search as run_search
 
 from ..control import GainSpec, Law
 from ..control.fitted import fitted
-from ..control.rivals.cascade import Cascade
 from ..control.rivals.registry import rivals
+from ..control.rivals.rival import Rival
 from ..errors import InvalidInputError
 from ..files.comparison import error_text
 from ..files.sections import named_gains
@@ -116,7 +116,10 @@ def compare(
     """
     if not problem.searched:
         raise InvalidInputError("a comparison needs gains to search: all are fixed; give one min and max")
-    against = {name: _laws(problem, kind) for name, kind in rivals().items()}
+    against = {name: _laws(problem, kind) for name, kind in rivals().items() if _suits(problem, kind)}
+    if not against:
+        rules = dict.fromkeys(f"{kind.NAME} {kind.NEEDS}" for kind in rivals().values())
+        raise InvalidInputError(f"no rival is made for this machine: {'; '.join(rules)}; compare another machine")
     progress.stage("proof of a start")
     first, fine = starting_point(problem, progress), refinable(problem)
     law, numbers, trials = problem.study.controller.law, range(seed, seed + seeds), []
@@ -142,12 +145,13 @@ def compare(
     return found
 
 
-def _laws(problem: Problem, kind: type[Cascade]) -> list[Cascade]:
+def _suits(problem: Problem, kind: type[Rival]) -> bool:
+    return all(kind.suits(member.plant) for member in problem.members)
+
+
+def _laws(problem: Problem, kind: type[Rival]) -> list[Rival]:
     """A rival for each member."""
-    try:
-        return [kind(plant=m.plant, modelling=problem.study.controller.modelling) for m in problem.members]
-    except ValueError as error:
-        raise InvalidInputError(f"{error}; compare another machine") from None
+    return [kind(plant=m.plant, modelling=problem.study.controller.modelling) for m in problem.members]
 
 
 class _Score:
@@ -233,7 +237,7 @@ class _Simulated:
 class _Rival(_Simulated):
     """A rival on a problem, with gains that all members share."""
 
-    def __init__(self, problem: Problem, ways: Sequence[Ground], name: str, laws: Sequence[Cascade]) -> None:
+    def __init__(self, problem: Problem, ways: Sequence[Ground], name: str, laws: Sequence[Rival]) -> None:
         super().__init__(problem, ways, laws)
         self.schema: tuple[GainSpec, ...] = laws[0].schema
         self.size = len(self.schema)

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from known_answers import claim_of, verdict
-from machines import study_from
+from machines import bundled, study_from
 from scipy.integrate import solve_ivp
 
 from hdmm_opt.control.rivals.registry import rivals
@@ -264,9 +264,16 @@ def test_the_air_of_two_chambers_is_a_spring():
 
 
 def test_rivals_of_force_are_not_made_for_a_valve():
-    with pytest.raises(InvalidInputError, match="first state is a position; compare another machine"):
-        compare(assemble(study_from(wheel())), (3, 0), 1, Options(), Progress(), seeds=1)
     for model in ("hydraulic_cylinder", "pneumatic_cylinder"):
+        plant = plant_model(model).build("valve", {}, {})
         for kind in rivals().values():
-            with pytest.raises(ValueError, match="it needs another input than a valve"):
-                kind(plant=plant_model(model).build("valve", {}, {}))
+            with pytest.raises(ValueError, match="it needs a"):
+                kind(plant=plant)
+
+
+def test_a_machine_without_rivals_says_what_they_need():
+    problem = assemble(study_from(bundled("pneumatic")))
+    with pytest.raises(
+        InvalidInputError, match=r"no rival is made for this machine: .* it needs a first state that is a"
+    ):
+        compare(problem, (3, 0), 1, Options(), Progress(), seeds=1)

@@ -18,7 +18,8 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from ..law import GainSpec
-from .cascade import Cascade, Command, searched
+from .cascade import Cascade, Command
+from .rival import searched
 
 
 class Adrc(Cascade):

@@ -6,14 +6,15 @@ holds. Where the actuator has currents, proportional loops with the same electri
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ...plants import Plant
 from ..law import GainSpec, limited
-from ..modelling import METERED, check_modelling, modelling_term
+from ..modelling import METERED, modelling_term
+from .rival import Rival
 
 #: Row of the speed, whose virtual control is the torque or the current.
 SPEED = 1
@@ -22,32 +23,17 @@ Command = Callable[[Any], tuple[Any, Any]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cascade(ABC):
-    """A rival for one plant.
+class Cascade(Rival):
+    """A rival that positions."""
 
-    Attributes:
-        plant: The plant.
-        modelling: Modelling terms; those of the study's law, so that all know the same.
-
-    Raises:
-        ValueError: a plant whose first state is no position, or a modelling term that it has no row for.
-    """
-
-    NAME: ClassVar[str]
+    NEEDS = "positions by a torque, a current or a force: it needs a first state that is a position, and no valve"
     #: Gains of the outer stage, with the range that each is searched in on a logarithmic scale.
     OUTER: ClassVar[tuple[GainSpec, ...]]
 
-    plant: Plant
-    modelling: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        check_modelling(self.plant, self.modelling)
-        if self.plant.first != "position" or len(self.plant.states) < 2:
-            raise ValueError(f"{self.NAME} positions: it needs a plant whose first state is a position")
-        if self.plant.level in METERED:
-            raise ValueError(
-                f"{self.NAME} commands a torque, a current or a force: it needs another input than a valve"
-            )
+    @classmethod
+    def suits(cls, plant: Plant) -> bool:
+        """A plant that goes to a position under a torque, a current or a force."""
+        return plant.first == "position" and len(plant.states) > 1 and plant.level not in METERED
 
     @property
     def _electrical(self) -> bool:
@@ -59,18 +45,9 @@ class Cascade(ABC):
         inner = GainSpec(name="inner", unit="1/s", meaning="bandwidth of the current loops", low=200.0, high=8000.0)
         return (*self.OUTER, *((inner,) if self._electrical else ()))
 
-    @property
-    @abstractmethod
-    def states(self) -> int:
-        """Number of discrete states."""
-
     @abstractmethod
     def outer(self, x: Any, r: Any, z: Any, gains: Any, command: Command, period: float) -> tuple[Any, Any]:
         """The command of the speed's row, and the states after a period."""
-
-    def start(self, x: Sequence[float], gains: Sequence[float]) -> list[float]:
-        """All states start at zero."""
-        return [0.0] * self.states
 
     def step(self, x: Any, r: Any, z: Any, gains: Any, nominal: Any, load: Any, period: float) -> Any:
         """One control period; as in `control/law.py`."""
@@ -114,16 +91,3 @@ class Cascade(ABC):
         gain, mass = ca.substitute([ca.jacobian(plant.force[SPEED], source), plant.mass[SPEED]], [plant.p], [nominal])
         values = [x, ca.SX.zeros(plant.u.numel()), ca.SX.zeros(plant.w.numel())]
         return mass / ca.substitute([gain], [plant.x, plant.u, plant.w], values)[0]
-
-
-def frozen(wanted: Any, given: Any, growth: Any) -> Any:
-    """The growth of an integral; none while it would push the limited command further outwards."""
-    import casadi as ca
-
-    outwards = ca.logic_and(ca.fabs(wanted - given) > 1e-9, (wanted - given) * growth > 0)
-    return ca.if_else(outwards, 0, growth)
-
-
-def searched(name: str, unit: str, meaning: str, low: float, high: float) -> GainSpec:
-    """A gain with the range that it is searched in."""
-    return GainSpec(name=name, unit=unit, meaning=meaning, low=low, high=high)

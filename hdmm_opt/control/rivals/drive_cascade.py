@@ -17,7 +17,8 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from ..law import GainSpec
-from .cascade import Cascade, Command, frozen, searched
+from .cascade import Cascade, Command
+from .rival import frozen, searched
 
 
 class DriveCascade(Cascade):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ...discovery import all_offered
-from .cascade import Cascade
+from .rival import Rival
 
 
-def rivals() -> dict[str, type[Cascade]]:
+def rivals() -> dict[str, type[Rival]]:
     """All rivals by the name that they give themselves."""
     return {kind.NAME: kind for kind in all_offered(f"{__package__}", "RIVAL").values()}

@@ -23,7 +23,8 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from ..law import GainSpec
-from .cascade import Cascade, Command, searched
+from .cascade import Cascade, Command
+from .rival import searched
 
 #: Exponent g, k_1, and the error e_0 at which both parts of the sliding variable weigh the same.
 EXPONENT, LINEAR, TYPICAL = 1.4, 0.5, 0.02
