@@ -30,19 +30,20 @@ td:first-child, td.n { white-space: nowrap } td .track i { background: var(--run
 {% for run in runs %}<h2>{{ run.name }}</h2><p class="soft">{{ run.text }}</p>
 <div class="wide"><table><tr><th>controller<th class="n">largest error [{{ unit }}]<th>{{ decades }} decades
 <th class="n">least<th class="n">most<th class="n">RMS [{{ unit }}]<th class="n">settled [s]<th class="n">limits
-<th class="n">travel<th class="n">certified [{{ unit }}]</tr>
+<th class="n">travel<th class="n">certified [{{ unit }}]<th>peaks</tr>
 {% for c in run.rows %}<tr{% if c.best %} class="best"{% endif %}><td>{{ c.name }}
 <td class="n{% if c.lost %} lost{% endif %}">{{ c.middle }}
 <td><div class="track"><i style="width: {{ c.width }}%"></i></div>
 <td class="n">{{ c.least }}<td class="n">{{ c.most }}<td class="n">{{ c.rms }}<td class="n">{{ c.settled }}
-<td class="n">{{ c.limits }}<td class="n">{{ c.travel }}<td class="n">{{ c.certified }}</tr>
+<td class="n">{{ c.limits }}<td class="n">{{ c.travel }}<td class="n">{{ c.certified }}<td class="n">{{ c.peaks }}</tr>
 {% endfor %}</table></div>{% endfor %}
 <h2>How each was tuned</h2>
 <div class="wide"><table><tr><th>controller<th>gains of the first seed</tr>
 {% for c in tunings %}<tr><td>{{ c.name }}<td>{{ c.gains }}</tr>{% endfor %}</table></div>
 <p class="soft">Largest error: after the transient, of the seed in the middle; least and most: of all seeds. Limits:
-largest share used. Travel: total variation of the input. Simulation proves nothing. Assumed, to be replaced by yours:
-{{ assumed }}.</p>
+largest share used. Travel: total variation of the input. Peaks: of every output, in SI units;
+apart: largest difference between the errors of two members, {{ unit }}. Simulation proves nothing. Assumed, to be
+replaced by yours: {{ assumed }}.</p>
 </body></html>
 """
 )
@@ -103,7 +104,18 @@ def _row(c: Any, name: str, best: float, worst: float, inside: Sequence[str]) ->
         "most": error_text(errors[-1]), "rms": error_text(m.rms_error_m), "settled": f"{m.settling_time_s:.3g}",
         "limits": f"{m.limit_use:.3g}", "travel": f"{sum(own.travel for own in m.members.values()):,.0f}",
         "certified": upward(1e3 * c.certified) if c.certified is not None and name in inside else "none",
+        "peaks": peaks_text(m),
     }  # fmt: skip
+
+
+def peaks_text(m: Any) -> str:
+    """The largest outputs of all members in SI units, and how far the errors of members were apart."""
+    peaks: dict[str, float] = {}
+    for own in m.members.values():
+        for name, value in own.peaks.items():
+            peaks[name] = max(peaks.get(name, 0.0), value)
+    parts = [f"{name.replace('_', ' ')} {value:.4g}" for name, value in peaks.items()]
+    return ", ".join([*parts, *([] if m.spread is None else [f"apart {error_text(m.spread)}"])])
 
 
 def gains_text(c: Any) -> str:

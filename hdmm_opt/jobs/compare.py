@@ -19,7 +19,7 @@ from ..control.fitted import fitted
 from ..control.rivals.registry import rivals
 from ..control.rivals.rival import Rival
 from ..errors import InvalidInputError
-from ..files.comparison import error_text
+from ..files.comparison import error_text, peaks_text
 from ..files.sections import named_gains
 from ..files.state import State
 from ..files.text import upward
@@ -277,7 +277,8 @@ def table(found: Sequence[Contender], proved: Sequence[str], unit: str, writes: 
     """
     heads = (f"max [m{unit}]", "least", "most", f"RMS [m{unit}]", "settled [s]", "limits", "travel", "certified")
     widths = (11, 10, 10, 11, 12, 8, 10, 11)
-    writes(f"{'scenario':18}{'controller':15}" + "".join(f"{h:>{w}}" for h, w in zip(heads, widths, strict=True)))
+    head = "".join(f"{h:>{w}}" for h, w in zip(heads, widths, strict=True))
+    writes(f"{'scenario':18}{'controller':15}{head}  peaks in SI units")
     for scenario in found[0].trials[0].figures:
         best = min(c.middle(scenario).maximum_error_m for c in found)
         for c in found:
@@ -288,4 +289,5 @@ def table(found: Sequence[Contender], proved: Sequence[str], unit: str, writes: 
             travel = sum(own.travel for own in m.members.values())
             rest = (error_text(m.rms_error_m), f"{m.settling_time_s:.3g}", f"{m.limit_use:.3g}", f"{travel:.4g}", bound)
             cells = zip((*sizes, *rest), widths, strict=True)
-            writes(f"{scenario:18}{c.name:15}" + "".join(f"{text:>{width}}" for text, width in cells))
+            line = "".join(f"{text:>{width}}" for text, width in cells)
+            writes(f"{scenario:18}{c.name:15}{line}  {peaks_text(m)}".rstrip())

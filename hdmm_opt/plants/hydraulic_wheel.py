@@ -102,8 +102,10 @@ def hydraulic_wheel(
         targets=tuple(targets), controlled=(True, chain, False), input_map=(1 if chain else 0,), x=ca.vertcat(*x), u=u,
         w=w, p=p, mass=ca.vertcat(*mass), force=ca.vertcat(*force),
         limits=LIMITS, stroke=(-1.0, 1.0), first="speed", carried="wheel_mass", leads=0 if chain else 2,
-        outputs={"wheel_torque": q["wheel_radius"] * pushed, "flow": flow, "power": pushed * v},
-        output_units={"wheel_torque": "N m", "flow": "m^3/s", "power": "W"},
+        outputs={
+            "wheel_torque": q["wheel_radius"] * pushed, "line_pressure": pressure, "flow": flow, "power": pushed * v
+        },
+        output_units={"wheel_torque": "N m", "line_pressure": "Pa", "flow": "m^3/s", "power": "W"},
     )  # fmt: skip
 
 

@@ -59,6 +59,8 @@ class Figures:
         members: By name.
         met_use: Largest share of an assumed range or rate that the loads of a body took: beyond 1 a run is outside the
             assumptions; None where all disturbances had courses.
+        spread: Largest difference between the errors of two members after the transient, for members that are to move
+            together and that nothing joins; None for others.
     """
 
     maximum_error_m: float
@@ -70,6 +72,7 @@ class Figures:
     diverged_s: float
     members: Mapping[str, MemberFigures]
     met_use: float | None = None
+    spread: float | None = None
 
     @property
     def diverged(self) -> bool:
@@ -79,9 +82,7 @@ class Figures:
     def to_data(self) -> dict[str, Any]:
         """Figures as JSON data; what is not finite, in a run that was lost, is null."""
         data = plain(asdict(self))
-        if self.met_use is None:
-            del data["met_use"]
-        return data
+        return {key: value for key, value in data.items() if key not in ("met_use", "spread") or value is not None}
 
 
 def plain(value: Any) -> Any:
@@ -124,6 +125,7 @@ def figures(
         diverged_s=lost,
         members=members,
         met_use=found.get("met use"),
+        spread=found.get("spread"),
     )
 
 

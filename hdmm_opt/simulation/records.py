@@ -60,6 +60,10 @@ def records(problem: Problem, parts: Sequence[Part], settings: Settings, signals
         Record(name="itae", kind="sum", value=signals.t * apart),
         Record(name="ever outside", kind="max", value=apart > settings.band),
     ]
+    if problem.machine.free and len(parts) > 1:
+        errors = ca.vertcat(*signals.errors)
+        apart = ca.if_else(late, ca.mmax(errors) - ca.mmin(errors), 0)
+        found.append(Record(name="spread", kind="max", value=apart, between=True))
     if signals.met_use is not None:
         found.append(Record(name="met use", kind="max", value=signals.met_use))
     for i, part in enumerate(parts):

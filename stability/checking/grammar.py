@@ -169,7 +169,7 @@ FIGURES = entry_of({
                         RECORDED),
         "peaks": named(RECORDED), "rms": named(RECORDED), "estimates": listed(RECORDED, 0, 2),
     }, {"travel": RECORDED})),
-}, {"met_use": RECORDED})  # fmt: skip
+}, {"met_use": RECORDED, "spread": RECORDED})  # fmt: skip
 VALIDATION = entry_of({
     "requirements": listed(entry_of({"name": text, "required": plain_number, "simulated": plain_number,
                                      "certified": maybe(plain_number)}), 1, 32),
