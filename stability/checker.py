@@ -164,6 +164,11 @@ shared: What members draw on together: an output of each adds up, and there is o
   Theorem: the sum of the amounts is at most the sum of the largest ones, each over the whole motion. Must fail: less to
   draw on, a member whose output is not told or is in another unit.
 
+watch: What shuts a machine down does not act while the assumptions hold: on errors, inputs and first states.
+
+  Theorem: a measured error is at most the certified one and the sensor's; an input and the first state are inside their
+  certified ranges. Of what a monitor estimates nothing is decided. Must fail: a monitor with less room than certified.
+
 command: The command: files in, verdicts out.
 """
 
@@ -1112,8 +1117,10 @@ DRIVE = entry_of(
 )  # fmt: skip
 NOTHING = named(text, 0)
 COURSE = listed(PAIR, 1, 1_000)
-FAULT = entry_of({"share": plain_number, "start_s": plain_number, "rate_1_s": plain_number,
-                  "stuck": listed(plain_number, 0, 2)})  # fmt: skip
+FAULT = entry_of(
+    {"share": plain_number, "start_s": plain_number, "rate_1_s": plain_number, "stuck": listed(plain_number, 0, 2)},
+    {"kind": some("actuator", "bias", "noise", "frozen", "blocked"), "size": plain_number},
+)
 SCENARIO = {
     "name": text, "disturbances": named(COURSE), "parameters": named(plain_number), "noise": plain_number,
     "bias": plain_number, "initial": plain_number, "quantisation": plain_number, "faults": named(FAULT),
@@ -1154,7 +1161,8 @@ STUDY = entry_of(
             {"law": text, "modelling": listed(some(*MODELLING), 0, 8), "rate_hz": plain_number,
              "rates_hz": named(plain_number), "delay_s": share,
              "gains": NOTHING, "members": named(named(RANGE))},
-            {"observer": entry_of({}, {"bandwidth_rad_s": plain_number}), "jitter_s": positive},
+            {"observer": entry_of({}, {"bandwidth_rad_s": plain_number}), "jitter_s": positive,
+             "monitor": entry_of({"error": positive, "limits": named(PAIR)})},
         ),
         "requirements": entry_of(
             {"tracking_error_m": plain_number, "member_error": named(plain_number)},
@@ -1233,7 +1241,7 @@ FIGURES = entry_of({
                         RECORDED),
         "peaks": named(RECORDED), "rms": named(RECORDED), "estimates": listed(RECORDED, 0, 2),
     }, {"travel": RECORDED})),
-}, {"met_use": RECORDED, "spread": RECORDED})  # fmt: skip
+}, {"met_use": RECORDED, "spread": RECORDED, "stopped_s": RECORDED})  # fmt: skip
 VALIDATION = entry_of({
     "requirements": listed(entry_of({"name": text, "required": plain_number, "simulated": plain_number,
                                      "certified": maybe(plain_number)}), 1, 32),
@@ -4630,6 +4638,40 @@ def drawn_together(data: dict[str, Any], members: list[Member]) -> list[Obligati
     return made
 
 
+# --- watch ---
+
+def quiet(data: dict[str, Any], members: list[Member]) -> list[Obligation]:
+    """Decide that the monitor of a study never acts inside the assumptions, as far as it measures what it watches."""
+    monitor = data["study"]["controller"].get("monitor")
+    return [] if monitor is None else [_quiet(monitor, member) for member in members]
+
+
+def _quiet(monitor: dict[str, Any], member: Member) -> Obligation:
+    claim = member.claim
+    error = number(monitor["error"], "the monitored error")
+    unit = str(claim.rows[0]["unit"])
+    met = claim.half_widths[0] + claim.measured[0]
+    least, told = 1 - met / error, [f"an error of {upward(met)} of {upward(error)} {unit}"]
+    estimated = []
+    limits = {limit["name"]: limit for limit in claim.limits}
+    for name, span in monitor["limits"].items():
+        need(name in limits and len(limits[name]["signals"]) == 1, f"{name} is no limit on one signal of {claim.name}")
+        low, high = numbers(span, 2, name)
+        need(low < high, f"the monitored range of {name} is upside down")
+        (signal,) = limits[name]["signals"]
+        first = signal == claim.rows[0]["state"]
+        if signal not in claim.inputs and not first:
+            estimated.append(name)
+            continue
+        found = symmetric(member.verdict.norm([signal]) + (claim.measured[0] if first else 0))
+        least = min(least, 2 * min(found[0] - low, high - found[1]) / (high - low))
+        told.append(f"{name} within {upward(found[1])}")
+    rest = f"; of {', '.join(estimated)}, which it estimates, nothing is decided" if estimated else ""
+    statement = f"inside the assumptions the monitor does not act: it sees at most {', '.join(told)}{rest}"
+    remedy = f"wider ranges of the monitor, an error of {upward(met)} {unit} among them"
+    return decided("monitor", statement, Fraction(least), "1", remedy, member=claim.name)
+
+
 # --- command ---
 
 def check_text(text: str, file: str = "", *, recorded: bool = True) -> Report:
@@ -4720,7 +4762,7 @@ def check_together(
         made.append(guarantees_kept(data, members))
     coupling = Coupling(data, data["couplings"][0], members) if data["couplings"] else None
     made += coupling.obligations() if coupling is not None else []
-    made += drawn_together(data, members)
+    made += [*drawn_together(data, members), *quiet(data, members)]
     wrong = [o for o in made if o.verdict != "proved"]
     if wrong:
         text = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"

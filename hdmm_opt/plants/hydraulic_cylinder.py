@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .hydraulics import FRICTION, LINE, VALVES, compliance, friction, valve_flow
+from .hydraulics import FRICTION, LINE, RELIEF, VALVES, compliance, friction, valve_flow
 from .parameter import Parameter
 from .plant import Limit, Plant
 from .registry import PlantModel
@@ -45,8 +45,8 @@ def hydraulic_cylinder(
     References:
         Merritt (1967), ch. 6.
 
-    Not guaranteed: dead band and slew of the valve, unequal areas, the stroke's effect on the oil's stiffness, relief
-        and cavitation are not modelled.
+    Not guaranteed: dead band and slew of the valve, unequal areas, the stroke's effect on the oil's stiffness
+        and cavitation are not modelled; relief valves only in simulation.
     """
     import casadi as ca
 
@@ -63,7 +63,7 @@ def hydraulic_cylinder(
         force=ca.vertcat(
             x[1], pushed - friction(x[1], q) - w[0], flow - q["area"] * x[1] - q["leakage"] * x[2], u[0] - x[3]
         ),
-        limits=LIMITS, stroke=(0.0, 0.8), carried="load_mass",
+        relief={"pressure": RELIEF}, limits=LIMITS, stroke=(0.0, 0.8), carried="load_mass",
         outputs={"rod_force": pushed, "flow": flow, "power": pushed * x[1]},
         output_units={"rod_force": "N", "flow": "m^3/s", "power": "W"},
     )  # fmt: skip

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .hydraulics import FRICTION, LINE, POWER, VALVES, compliance, friction, valve_flow
+from .hydraulics import FRICTION, LINE, POWER, RELIEF, VALVES, compliance, friction, valve_flow
 from .parameter import Parameter
 from .plant import Limit, Plant
 from .registry import PlantModel
@@ -78,8 +78,9 @@ def hydraulic_wheel(
     References:
         Heydari Shahna (2025), publications P-2, P-5 and P-12; Merritt (1967), ch. 6, for valve and motor.
 
-    Not guaranteed: dead band and slew of the valve, the dynamics of the supply, relief and cavitation are not modelled:
-        limits keep the motion away from them. The tyre is not part of it: its force is the load.
+    Not guaranteed: dead band and slew of the valve, the dynamics of the supply and cavitation are not modelled, and
+        relief valves only in simulation: limits keep the motion away from them. The tyre is not part of it: its force
+        is the load.
     """
     import casadi as ca
 
@@ -102,6 +103,7 @@ def hydraulic_wheel(
         targets=tuple(targets), controlled=(True, chain, False), input_map=(1 if chain else 0,), x=ca.vertcat(*x), u=u,
         w=w, p=p, mass=ca.vertcat(*mass), force=ca.vertcat(*force),
         limits=LIMITS, stroke=(-1.0, 1.0), first="speed", carried="wheel_mass", leads=0 if chain else 2,
+        relief={"pressure": RELIEF},
         outputs={
             "wheel_torque": q["wheel_radius"] * pushed, "line_pressure": pressure, "flow": flow, "power": pushed * v
         },

@@ -85,6 +85,8 @@ class Plant:
         first: Whether the first state is a position or a speed.
         efforts: What a motion asks of it; None where only speed, acceleration and jerk are limited.
         leads: Sections of lead that a law for it has in the row of an input: lags and modes that stand between.
+        relief: How steeply a relief valve opens beyond the limit on a state, in h per unit of the state. It takes
+            nothing where the limits hold, so that a proof, which keeps to them, is without it.
     """
 
     name: str
@@ -114,6 +116,7 @@ class Plant:
     efforts: Efforts | None = None
     ratings: Mapping[str, Parameter] = field(default_factory=dict)
     leads: int = 0
+    relief: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def modes(self) -> tuple[str, ...]:
@@ -194,6 +197,20 @@ class Plant:
                 r = [place, 0.0, 0.0, 0.0]
                 found[i] = float(ca.evalf(self.balanced(i, ca.DM(r), ca.DM(list(loads)), ca.DM(list(values.values())))))
         return found
+
+    def feels(self, state: str) -> bool:
+        """Whether a state feels a disturbance while the first state is held, by itself or by way of others."""
+        import casadi as ca
+
+        reached, fresh = set[int](), [self.states.index(state)]
+        while fresh:
+            i = fresh.pop()
+            reached.add(i)
+            if i and ca.depends_on(self.force[i], self.w):
+                return True
+            read = [j for j in range(1, len(self.states)) if ca.depends_on(self.force[i], self.x[j])]
+            fresh += [j for j in read if i and j not in reached]
+        return False
 
     def readers(self, i: int) -> list[int]:
         """The other rows that read the state of row i."""

@@ -21,6 +21,7 @@ from ..plants import Parameter, Plant
 from ..study import Study
 from .fit import (
     check_disturbances,
+    check_monitor,
     check_motion,
     check_observer,
     check_rates,
@@ -54,6 +55,7 @@ def assemble(study: Study, references: tuple[Reference, ...] | None = None) -> P
     sections = {"noise": uncertainty.noise, "resolution": uncertainty.resolution, "initial": uncertainty.initial}
     refuse([
         *check_disturbances(study, machine), *check_scenarios(study, machine), *check_rates(study, machine),
+        *check_monitor(study, machine),
         *(error for kind, given in sections.items() for error in check_states(f"uncertainty.{kind}", given, machine)),
     ])  # fmt: skip
     found = {

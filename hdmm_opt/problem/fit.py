@@ -158,6 +158,25 @@ def check_observer(study: Study, machine: Machine, ranges: Mapping[str, Sequence
             )
 
 
+def check_monitor(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
+    """A monitor watches limits of one signal, of plants whose other rows do not read a disturbance."""
+    monitor = study.controller.monitor
+    if monitor is None:
+        return
+    for name, plant in zip(machine.members, machine.plants, strict=True):
+        known = [limit.name for limit in plant.limits if len(limit.signals) == 1]
+        for limit in monitor.limits:
+            if limit not in known:
+                yield InvalidInputError(f"controller.monitor.limits.{limit} is unknown; {nearest(limit, known)}")
+        for limit in plant.limits:
+            signal = limit.signals[0]
+            if limit.name in monitor.limits and signal in plant.states[1:] and plant.feels(signal):
+                yield InvalidInputError(
+                    f"controller.monitor.limits.{limit.name}: the {signal} of {name} feels a disturbance, and cannot "
+                    "be estimated from the speed; remove it"
+                )
+
+
 def check_motion(machine: Machine, references: tuple[Reference, ...]) -> None:
     """No reference passes by itself what limits the rate of a first state."""
     for name, plant, reference in zip(machine.members, machine.plants, references, strict=True):

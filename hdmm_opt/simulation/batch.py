@@ -154,6 +154,9 @@ class Batches:
                 np.array([part.law.start(x0.tolist(), g.tolist()) for x0, g in zip(own.T, gains.T, strict=True)]).T,
                 (part.law.states, lanes),
             )
+            discrete["seen"][:] = own[0]
+            if part.monitor is not None:  # its estimates have settled
+                discrete["monitor"][: len(own) + 1] = np.vstack([own, own[:1]])
             seen = own.copy()
             if part.observer is not None:  # it starts from the first measurement and the reference's speed
                 discrete["observer"][0], seen[1] = own[0] - r[0], r[1]

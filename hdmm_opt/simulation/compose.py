@@ -7,11 +7,13 @@ from typing import Any
 
 from ..control.observer import observed
 from ..machines.body import Body
+from ..plants import Plant
 from ..problem import Problem
 from .acceleration import accelerations
 from .engine.system import System, Task
-from .layout import Part, size_of
+from .layout import FAULT, Part, size_of
 from .records import Settings, Signals, records
+from .scenario import KINDS
 
 #: A member further than this from its reference, in its unit, ends a run as lost.
 DIVERGED = 0.5
@@ -58,7 +60,7 @@ def compose(
         met = ca.vertcat(*(asked[body.met.index(n)] if n in body.met else courses[k] for k, n in enumerate(names)))
         tasks.append(Task(every=1, after=ca.vertcat(z, asked, watched[: len(body.met)])))
         use = _use(problem, body, watched, period)
-    rates = _rates(problem, parts, states, discrete, constants, met, r)
+    rates = _rates(problem, parts, states, discrete, constants, met, r, t, extras)
     rates += [body.rate(moved, firsts, ground)] if body is not None else []
     errors = [states[i][0] - _taylor(r[i], tau) for i in range(n)]
     place = machine.place(ca.vertcat(*(part[0] for part in states)))
@@ -70,12 +72,13 @@ def compose(
     signals = Signals(
         states=states, errors=errors, commanded=[d["commanded"] for d in discrete], outputs=outputs,
         travels=[d["travel"] for d in discrete], estimates=[d["observer"] for d in discrete],
-        apart=_distance(place - wanted, free=machine.free), met_use=use, t=t, tau=tau,
+        apart=_distance(place - wanted, free=machine.free), met_use=use,
+        stopped=shut_down(parts, discrete) if any(part.monitor for part in parts) else None, t=t, tau=tau,
     )  # fmt: skip
     shown: dict[str, Any] = {"x": x, "place": place, "wanted": wanted, "met": met}
     if body is not None:
         shown["body"] = ca.vertcat(moved, body.outputs(moved, firsts, ground))
-    for key in ("law", "commanded", "errors"):
+    for key in ("law", "commanded", "errors", "monitor"):
         shown[key] = ca.vertcat(*(d[key] for d in discrete))
     shown["outputs"] = ca.vertcat(*(value for column in outputs for value in column.values()))
     return System(
@@ -121,7 +124,7 @@ def _outputs(part: Part, x: Any, discrete: dict[str, Any], constants: dict[str, 
 
 def _rates(
     problem: Problem, parts: Sequence[Part], states: list[Any], discrete: list[Any], constants: list[Any], own: Any,
-    r: list[Any],
+    r: list[Any], t: Any, extras: frozenset[str],
 ) -> list[Any]:  # fmt: skip
     """X' of each member, under its own disturbances or under the loads of the coupling."""
     import casadi as ca
@@ -143,8 +146,27 @@ def _rates(
         if gained is not None:
             row = plant.accelerating
             rate = ca.vertcat(rate[:row], gained[i], rate[row + 1 :])
+        rate = rate - ca.substitute([_relieved(plant, states[i])], [plant.p], [parameters[i]])[0]
+        if "fault" in extras:
+            fault, row = constants[i]["fault"], plant.accelerating
+            blocked = ca.logic_and(t >= fault[1], fault[3] == KINDS.index("blocked"))
+            held = ca.if_else(blocked, -states[i][row] / ca.fmax(fault[4], 1e-9), rate[row])
+            rate = ca.vertcat(rate[:row], held, rate[row + 1 :])
         rates.append(rate)
     return rates
+
+
+def _relieved(plant: Plant, x: Any) -> Any:
+    """What relief valves take off the rate of each state, which they only do beyond its limit."""
+    import casadi as ca
+
+    limits = {limit.signals[0]: limit.value for limit in plant.limits if len(limit.signals) == 1}
+    rows = []
+    for k, state in enumerate(plant.states):
+        opens = plant.relief.get(state)
+        over = ca.fmax(ca.fabs(x[k]) - limits[state], 0) if opens else 0
+        rows.append(opens * ca.sign(x[k]) * over / plant.mass[k] if opens else ca.SX(0))
+    return ca.vertcat(*rows)
 
 
 def _tasks(
@@ -154,7 +176,7 @@ def _tasks(
     """One task for each control period; members of one period run together."""
     import casadi as ca
 
-    found = []
+    stop, found = shut_down(parts, discrete), []
     for every in sorted({part.every for part in parts}):
         after = []
         for i, part in enumerate(parts):
@@ -162,9 +184,9 @@ def _tasks(
                 after.append(z[part.z])
                 continue
             channel = draws[part.draws]
-            measured = _measured(part, states[i], channel, constants[i], extras)
+            measured = _measured(part, states[i], channel, discrete[i], constants[i], t, extras)
             after.append(_controlled(
-                problem, part, states[i], measured, r[i], foreseen[i], discrete[i], constants[i], t, extras
+                problem, part, states[i], measured, r[i], foreseen[i], discrete[i], constants[i], t, stop, extras
             ))  # fmt: skip
         found.append(Task(every=every, after=ca.vertcat(*after)))
     if any(part.waiting for part in parts):
@@ -210,12 +232,26 @@ def _delivered(u: Any, constants: dict[str, Any], t: Any, extras: frozenset[str]
     if "fault" not in extras:
         return u
     fault = constants["fault"]
-    a = ca.if_else(t >= fault[1], fault[0] * (1 - ca.exp(-fault[2] * (t - fault[1]))), 0)
-    return (1 - a) * u + a * fault[3:]
+    acts = ca.logic_and(t >= fault[1], fault[3] == KINDS.index("actuator"))
+    a = ca.if_else(acts, fault[0] * (1 - ca.exp(-fault[2] * (t - fault[1]))), 0)
+    return (1 - a) * u + a * fault[FAULT:]
 
 
-def _measured(part: Part, x: Any, draws: Any, constants: dict[str, Any], extras: frozenset[str]) -> Any:
-    """What the sensors say: noise, offset, rounding."""
+def shut_down(parts: Sequence[Part], discrete: list[dict[str, Any]]) -> Any:
+    """Whether the monitor of any member has shut its actuator down: then all are."""
+    import casadi as ca
+
+    stop = ca.SX(0)
+    for part, own in zip(parts, discrete, strict=True):
+        if part.monitor is not None:
+            stop = ca.logic_or(stop, own["monitor"][-1] > 0)
+    return stop
+
+
+def _measured(
+    part: Part, x: Any, draws: Any, discrete: dict[str, Any], constants: dict[str, Any], t: Any, extras: frozenset[str]
+) -> Any:  # fmt: skip
+    """What the sensors say: noise, offset, rounding, and what goes wrong with that of the first state."""
     import casadi as ca
 
     noisy, n, grid = part.noisy, len(part.law.plant.states), constants["grid"]
@@ -226,14 +262,21 @@ def _measured(part: Part, x: Any, draws: Any, constants: dict[str, Any], extras:
     ]  # fmt: skip
     if "quantisation" in extras:
         sensed = [ca.if_else(grid[i] > 0, grid[i] * ca.floor(sensed[i] / grid[i] + 0.5), sensed[i]) for i in range(n)]
+    if "fault" in extras:
+        fault = constants["fault"]
+        kind = ca.if_else(t >= fault[1], fault[3], 0)
+        wrong = ca.if_else(kind == KINDS.index("bias"), fault[4], 0)
+        if noisy:
+            wrong += ca.if_else(kind == KINDS.index("noise"), fault[4] * draws[0], 0)
+        sensed[0] = ca.if_else(kind == KINDS.index("frozen"), discrete["seen"], sensed[0] + wrong)
     return ca.vertcat(*sensed)
 
 
 def _controlled(
     problem: Problem, part: Part, x: Any, measured: Any, r: Any, foreseen: Any, discrete: dict[str, Any],
-    constants: dict[str, Any], t: Any, extras: frozenset[str],
+    constants: dict[str, Any], t: Any, stop: Any, extras: frozenset[str],
 ) -> Any:  # fmt: skip
-    """One period of a member's observer, law and actuator, in the order of its discrete states."""
+    """One period of a member's observer, law, monitor and actuator, in the order of its discrete states."""
     import casadi as ca
 
     plant, seen, following = part.law.plant, measured, discrete["observer"]
@@ -247,6 +290,13 @@ def _controlled(
     u, after, errors = part.law.step(
         seen, r, discrete["law"], constants["gains"], nominal, load, part.period
     )  # fmt: skip
+    watched = ca.SX(0, 1)
+    if part.monitor is not None:
+        bad, watched = part.monitor.watched(
+            plant, discrete["monitor"], measured[0], r[0], u, discrete["commanded"], nominal, part.period
+        )
+        u = ca.if_else(ca.logic_or(bad, stop), ca.SX.zeros(u.numel()), u)
+        watched[-1] = ca.logic_or(bad, stop)
     applied = discrete["applied"] if part.waiting else _delivered(u, constants, t, extras)
     travel = discrete["travel"] + ca.norm_1(u - discrete["commanded"])
-    return ca.vertcat(after, u, applied, errors, travel, following, discrete["pending"])
+    return ca.vertcat(after, u, applied, errors, travel, following, discrete["pending"], measured[0], watched)

@@ -61,6 +61,8 @@ class Figures:
             assumptions; None where all disturbances had courses.
         spread: Largest difference between the errors of two members after the transient, for members that are to move
             together and that nothing joins; None for others.
+        stopped_s: Time from which a monitor kept the actuators shut down, s; infinite where it did not act, None
+            without one. Error figures of a run that was shut down say how far the motion that was asked for went on.
     """
 
     maximum_error_m: float
@@ -73,6 +75,7 @@ class Figures:
     members: Mapping[str, MemberFigures]
     met_use: float | None = None
     spread: float | None = None
+    stopped_s: float | None = None
 
     @property
     def diverged(self) -> bool:
@@ -82,7 +85,8 @@ class Figures:
     def to_data(self) -> dict[str, Any]:
         """Figures as JSON data; what is not finite, in a run that was lost, is null."""
         data = plain(asdict(self))
-        return {key: value for key, value in data.items() if key not in ("met_use", "spread") or value is not None}
+        given = {"met_use": self.met_use, "spread": self.spread, "stopped_s": self.stopped_s}
+        return {key: value for key, value in data.items() if key not in given or given[key] is not None}
 
 
 def plain(value: Any) -> Any:
@@ -126,7 +130,14 @@ def figures(
         members=members,
         met_use=found.get("met use"),
         spread=found.get("spread"),
+        stopped_s=_stopped(found, count, period),
     )
+
+
+def _stopped(found: Mapping[str, float], count: int, period: float) -> float | None:
+    if "running" not in found:
+        return None
+    return found["running"] * period if found["running"] < count else math.inf
 
 
 def _member(part: Part, found: Mapping[str, float], gone: bool, ticks: int, late: int, period: float) -> MemberFigures:

@@ -1,10 +1,10 @@
 """Where everything of a loop lies: symbols and slices of its states and constants, member by member.
 
-Discrete states, member by member: those of the law, commanded input, applied input, errors, those of the observer, and
-the inputs that wait for their delay, newest first.
+Discrete states, member by member: those of the law, commanded input, applied input, errors, those of the observer, the
+inputs that wait for their delay, newest first, the last measurement, and those of the monitor.
 Constants of a run: by member gains, parameters, spread and offset of the noisy states, quantisation steps, the
-fault's share, start, rate and stuck input, and the phase of the jitter. Shared columns: each reference with three
-derivatives, then foreseen loads.
+fault's share, start, rate, kind, size and stuck input, and the phase of the jitter. Shared columns: each reference with
+three derivatives, then foreseen loads.
 """
 
 from __future__ import annotations
@@ -16,9 +16,13 @@ from typing import Any
 from stability import Observer
 
 from ..control import Law
+from ..control.monitor import Monitor
 from ..control.observer import SIZE
 from ..problem import Problem
 from ..problem.build import observer_at
+
+#: Constants of a fault before its stuck inputs: share, start, rate, kind, size.
+FAULT = 5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +41,7 @@ class Part:
         errors: Number of errors that its law shows.
         waiting: Ticks until a commanded input acts.
         early: Ticks that it may act earlier or later, in every period anew.
+        monitor: What shuts its actuator down; None where nothing does.
         x, z, draws, fixed: Slices of its states, discrete states, random draws and constants.
     """
 
@@ -51,6 +56,7 @@ class Part:
     errors: int
     waiting: int
     early: int
+    monitor: Monitor | None
     x: slice
     z: slice
     draws: slice
@@ -84,14 +90,16 @@ class Part:
         return {"law": self.law.states, "commanded": inputs, "applied": inputs, "errors": self.errors,
                 "travel": 1,
                 "observer": 0 if self.observer is None else SIZE,
-                "pending": inputs * (self.waiting + self.early)}  # fmt: skip
+                "pending": inputs * (self.waiting + self.early), "seen": 1,
+                "monitor": 0 if self.monitor is None else self.monitor.size(self.law.plant)}  # fmt: skip
 
     @property
     def constant_sizes(self) -> dict[str, int]:
         """Sizes of its constants."""
         plant, noisy = self.law.plant, len(self.noisy)
         return {"gains": len(self.law.schema), "parameters": len(plant.parameters), "spread": noisy, "offset": noisy,
-                "grid": len(plant.states), "fault": 3 + len(plant.inputs), "phase": 1 if self.early else 0}  # fmt: skip
+                "grid": len(plant.states), "fault": FAULT + len(plant.inputs),
+                "phase": 1 if self.early else 0}  # fmt: skip
 
 
 def parts_of(problem: Problem, laws: Sequence[Law], period: float) -> list[Part]:
@@ -114,8 +122,8 @@ def parts_of(problem: Problem, laws: Sequence[Law], period: float) -> list[Part]
             index=k, name=member.name, law=law, every=every, period=every * period, noise=member.bounds.noise,
             resolution=member.resolution,
             observer=observer_at(problem.study, every * period), errors=errors_of(law),
-            waiting=round(member.bounds.delay / period), early=round(member.bounds.jitter / period), x=nothing,
-            z=nothing, draws=nothing, fixed=nothing,
+            waiting=round(member.bounds.delay / period), early=round(member.bounds.jitter / period),
+            monitor=monitor_of(problem, k), x=nothing, z=nothing, draws=nothing, fixed=nothing,
         )  # fmt: skip
         sizes = {"x": len(law.plant.states), "z": sum(part.discrete_sizes.values()), "draws": len(part.noisy),
                  "fixed": sum(part.constant_sizes.values())}  # fmt: skip
@@ -123,6 +131,18 @@ def parts_of(problem: Problem, laws: Sequence[Law], period: float) -> list[Part]
         made.append(Part(**{**part.__dict__, **places}))
         starts = {key: starts[key] + size for key, size in sizes.items()}
     return made
+
+
+def monitor_of(problem: Problem, k: int) -> Monitor | None:
+    """The monitor of a member, as the study asks for it."""
+    section, member = problem.study.controller.monitor, problem.members[k]
+    if section is None:
+        return None
+    ranges = {
+        limit.signals[0]: section.limits[limit.name] for limit in member.plant.limits if limit.name in section.limits
+    }
+    noisy = member.bounds.noise[0] > 0 and member.resolution[0] == 0
+    return Monitor(error=section.error, ranges=ranges, noisy=noisy)
 
 
 def errors_of(law: Law) -> int:

@@ -32,6 +32,7 @@ class Signals:
         states, errors, commanded, outputs, travels, estimates: Of each member.
         apart: Distance of the output from its reference.
         met_use: Share of the assumptions that a body's loads take; None without one.
+        stopped: Whether a monitor has shut an actuator down; None without one.
         t, tau: Time of the tick and since the tick, s.
     """
 
@@ -43,6 +44,7 @@ class Signals:
     estimates: list[Any]
     apart: Any
     met_use: Any
+    stopped: Any
     t: Any
     tau: Any
 
@@ -64,6 +66,8 @@ def records(problem: Problem, parts: Sequence[Part], settings: Settings, signals
         errors = ca.vertcat(*signals.errors)
         apart = ca.if_else(late, ca.mmax(errors) - ca.mmin(errors), 0)
         found.append(Record(name="spread", kind="max", value=apart, between=True))
+    if signals.stopped is not None:
+        found.append(Record(name="running", kind="sum", value=ca.logic_not(signals.stopped)))
     if signals.met_use is not None:
         found.append(Record(name="met use", kind="max", value=signals.met_use))
     for i, part in enumerate(parts):

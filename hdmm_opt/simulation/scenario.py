@@ -23,12 +23,16 @@ Course = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
-    """An actuator that loses effectiveness from a time on.
+    """Something of a member that goes wrong from a time on.
 
-    It delivers ``(1 - a(t)) u + a(t) u_stuck`` with ``a = share (1 - exp(-rate (t - start)))`` from its start on
-    (Heydari Shahna 2025, P-3).
+    An actuator that loses effectiveness delivers ``(1 - a(t)) u + a(t) u_stuck`` with
+    ``a = share (1 - exp(-rate (t - start)))`` from its start on (Heydari Shahna 2025, P-3). A sensor of a first state
+    says ``size`` too much ("bias"), is wrong by up to ``size`` at random besides ("noise"), or says what it said last
+    ("frozen"); a first state that is a speed stands still ("blocked": it falls by e in ``size`` seconds).
 
     Attributes:
+        kind: What goes wrong: "actuator", a sensor's "bias" or "noise", "frozen", or "blocked".
+        size: How much, in the unit of the first state; for "blocked" a time constant, s.
         share: Lost share of the input in the end, 0 … 1; 1 is stuck.
         start_s: Time at which it begins, s.
         rate_1_s: How fast it grows, 1/s.
@@ -39,13 +43,22 @@ class Fault:
     start_s: float
     rate_1_s: float
     stuck: tuple[float, ...] = ()
+    kind: str = "actuator"
+    size: float = 0.0
 
     def column(self, inputs: int) -> Array:
-        """Share, start, rate, and what a stuck actuator delivers. Shape (3 + inputs,)."""
+        """Share, start, rate, number of the kind, size, and what a stuck actuator delivers. Shape (5 + inputs,)."""
         stuck = (*self.stuck, *[0.0] * (inputs - len(self.stuck)))
-        return np.array([self.share, self.start_s, self.rate_1_s, *stuck])
+        return np.array([self.share, self.start_s, self.rate_1_s, KINDS.index(self.kind), self.size, *stuck])
+
+    def to_data(self) -> dict[str, Any]:
+        """The fault as JSON data; what is only for sensors where it is one."""
+        data = {**asdict(self), "stuck": list(self.stuck)}
+        return data if self.kind != "actuator" else {k: v for k, v in data.items() if k not in ("kind", "size")}
 
 
+#: What may go wrong, by the number that a loop knows it by.
+KINDS = ("actuator", "bias", "noise", "frozen", "blocked")
 #: Nothing goes wrong.
 SOUND = Fault(share=0.0, start_s=0.0, rate_1_s=0.0)
 
@@ -94,7 +107,7 @@ class Scenario:
         """The scenario as JSON data."""
         data = asdict(self)
         data["disturbances"] = {name: [list(p) for p in course] for name, course in self.disturbances.items()}
-        data["faults"] = {name: {**asdict(f), "stuck": list(f.stuck)} for name, f in self.faults.items()}
+        data["faults"] = {name: fault.to_data() for name, fault in self.faults.items()}
         if self.ground is None:
             del data["ground"]
         else:
@@ -144,7 +157,7 @@ def within_assumptions(problem: Problem, scenario: Scenario, figures: Figures | 
 
 
 def _allowed(plant: Plant, name: str, fault: Fault, scenario: Scenario) -> bool:
-    if EFFECTIVENESS not in plant.parameters or any(fault.stuck):
+    if fault.kind != "actuator" or EFFECTIVENESS not in plant.parameters or any(fault.stuck):
         return False
     p = plant.parameters[EFFECTIVENESS]
     low, high = p.ends or (p.value, p.value)

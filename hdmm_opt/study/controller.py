@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from .messages import refused
-from .sections import GainSection, Name, NonNegative, Positive, Section
+from .sections import GainSection, Name, NonNegative, Pair, Positive, Section
 
 Rate = Annotated[float, Field(gt=0, le=1e5)]
 
@@ -19,6 +19,24 @@ class ObserverSection(Section):
     """
 
     bandwidth_rad_s: Positive | None = None
+
+
+class MonitorSection(Section):
+    """What shuts every actuator down: a measured error of a first state, in its unit, or a signal out of a range.
+
+    The ranges stand by the names of the plant's limits; they are of what is commanded, and of states as they are
+    estimated.
+    """
+
+    error: Positive
+    limits: dict[Name, Pair] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> MonitorSection:
+        for name, (low, high) in self.limits.items():
+            if not low < high:
+                raise refused(f"limits.{name}", f"needs lower < upper: got [{low:g}, {high:g}]", "swap or correct them")
+        return self
 
 
 class ControllerSection(Section):
@@ -37,6 +55,7 @@ class ControllerSection(Section):
     gains: dict[str, GainSection] = Field(default_factory=dict)
     members: dict[Name, dict[str, GainSection]] = Field(default_factory=dict)
     observer: ObserverSection | None = None
+    monitor: MonitorSection | None = None
 
     def rate_of(self, member: str) -> float:
         """Control rate of a member, Hz."""

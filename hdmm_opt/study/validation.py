@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -40,12 +40,20 @@ class RequirementSection(Section):
 
 
 class FaultSection(Section):
-    """An actuator that loses effectiveness."""
+    """What goes wrong with a member: its actuator loses effectiveness, its sensor is wrong, or it is blocked."""
 
-    share: Annotated[float, Field(ge=0, le=1)]
+    share: Annotated[float, Field(ge=0, le=1)] = 0.0
     start_s: NonNegative
-    rate_1_s: Positive
+    rate_1_s: Positive = 1e3
     stuck: Annotated[tuple[float, ...], Field(max_length=2)] = ()
+    kind: Literal["actuator", "bias", "noise", "frozen", "blocked"] = "actuator"
+    size: float = 0.0
+
+    @model_validator(mode="after")
+    def _sized(self) -> FaultSection:
+        if self.kind in ("bias", "noise", "blocked") and (self.size == 0 or (self.kind != "bias" and self.size < 0)):
+            raise refused("size", f'of a fault of kind "{self.kind}" says how much: got {self.size:g}', "give it")
+        return self
 
 
 def _course(value: Any) -> Any:

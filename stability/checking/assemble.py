@@ -15,7 +15,7 @@ ORDER = (
     "limits", "arithmetic", "forms", "fixed", "parsing", "shape", "grammar", "claim", "reference", "statement",
     "structure", "course", "reading", "balance", "targets", "loop", "matrices", "jitter", "lag", "lead", "turn", "sums",
     "responses", "obligation", "impulse", "golden", "effects", "obligations", "member", "motion", "coupling",
-    "requirements", "shared", "command",
+    "requirements", "shared", "watch", "command",
 )  # fmt: skip
 TARGET = Path(__file__).parent.parent / "checker.py"
 

@@ -34,6 +34,7 @@ from .parsing import check_digests, number, parse, wrong_schema
 from .requirements import beyond_error
 from .shared import drawn_together
 from .statement import met
+from .watch import quiet
 
 
 def check_text(text: str, file: str = "", *, recorded: bool = True) -> Report:
@@ -124,7 +125,7 @@ def check_together(
         made.append(guarantees_kept(data, members))
     coupling = Coupling(data, data["couplings"][0], members) if data["couplings"] else None
     made += coupling.obligations() if coupling is not None else []
-    made += drawn_together(data, members)
+    made += [*drawn_together(data, members), *quiet(data, members)]
     wrong = [o for o in made if o.verdict != "proved"]
     if wrong:
         text = f"{wrong[0].name} (margin {downward(wrong[0].margin)} {wrong[0].unit})"

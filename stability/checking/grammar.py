@@ -48,8 +48,10 @@ DRIVE = entry_of(
 )  # fmt: skip
 NOTHING = named(text, 0)
 COURSE = listed(PAIR, 1, 1_000)
-FAULT = entry_of({"share": plain_number, "start_s": plain_number, "rate_1_s": plain_number,
-                  "stuck": listed(plain_number, 0, 2)})  # fmt: skip
+FAULT = entry_of(
+    {"share": plain_number, "start_s": plain_number, "rate_1_s": plain_number, "stuck": listed(plain_number, 0, 2)},
+    {"kind": some("actuator", "bias", "noise", "frozen", "blocked"), "size": plain_number},
+)
 SCENARIO = {
     "name": text, "disturbances": named(COURSE), "parameters": named(plain_number), "noise": plain_number,
     "bias": plain_number, "initial": plain_number, "quantisation": plain_number, "faults": named(FAULT),
@@ -90,7 +92,8 @@ STUDY = entry_of(
             {"law": text, "modelling": listed(some(*MODELLING), 0, 8), "rate_hz": plain_number,
              "rates_hz": named(plain_number), "delay_s": share,
              "gains": NOTHING, "members": named(named(RANGE))},
-            {"observer": entry_of({}, {"bandwidth_rad_s": plain_number}), "jitter_s": positive},
+            {"observer": entry_of({}, {"bandwidth_rad_s": plain_number}), "jitter_s": positive,
+             "monitor": entry_of({"error": positive, "limits": named(PAIR)})},
         ),
         "requirements": entry_of(
             {"tracking_error_m": plain_number, "member_error": named(plain_number)},
@@ -169,7 +172,7 @@ FIGURES = entry_of({
                         RECORDED),
         "peaks": named(RECORDED), "rms": named(RECORDED), "estimates": listed(RECORDED, 0, 2),
     }, {"travel": RECORDED})),
-}, {"met_use": RECORDED, "spread": RECORDED})  # fmt: skip
+}, {"met_use": RECORDED, "spread": RECORDED, "stopped_s": RECORDED})  # fmt: skip
 VALIDATION = entry_of({
     "requirements": listed(entry_of({"name": text, "required": plain_number, "simulated": plain_number,
                                      "certified": maybe(plain_number)}), 1, 32),
