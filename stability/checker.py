@@ -166,8 +166,8 @@ shared: What members draw on together: an output of each adds up, and there is o
 
 watch: What shuts a machine down does not act while the assumptions hold: on errors, inputs and first states.
 
-  Theorem: a measured error is at most the certified one and the sensor's; an input and the first state are inside their
-  certified ranges. Of what a monitor estimates nothing is decided. Must fail: a monitor with less room than certified.
+  Theorem: a measured error is at most the certified one and the sensor's; an input and a measured state are inside
+  their certified ranges. Of what a monitor estimates nothing is decided. Must fail: a monitor with less room than that.
 
 command: The command: files in, verdicts out.
 """
@@ -4652,18 +4652,18 @@ def _quiet(monitor: dict[str, Any], member: Member) -> Obligation:
     unit = str(claim.rows[0]["unit"])
     met = claim.half_widths[0] + claim.measured[0]
     least, told = 1 - met / error, [f"an error of {upward(met)} of {upward(error)} {unit}"]
-    estimated = []
+    estimated, unmeasured = [], [row["state"] for k, row in enumerate(claim.rows) if k and not row["controlled"]]
+    wrong = {row["state"]: size for row, size in zip(claim.rows, claim.measured, strict=True)}
     limits = {limit["name"]: limit for limit in claim.limits}
     for name, span in monitor["limits"].items():
         need(name in limits and len(limits[name]["signals"]) == 1, f"{name} is no limit on one signal of {claim.name}")
         low, high = numbers(span, 2, name)
         need(low < high, f"the monitored range of {name} is upside down")
         (signal,) = limits[name]["signals"]
-        first = signal == claim.rows[0]["state"]
-        if signal not in claim.inputs and not first:
+        if signal in unmeasured:
             estimated.append(name)
             continue
-        found = symmetric(member.verdict.norm([signal]) + (claim.measured[0] if first else 0))
+        found = symmetric(member.verdict.norm([signal]) + wrong.get(signal, Fraction(0)))
         least = min(least, 2 * min(found[0] - low, high - found[1]) / (high - low))
         told.append(f"{name} within {upward(found[1])}")
     rest = f"; of {', '.join(estimated)}, which it estimates, nothing is decided" if estimated else ""

@@ -198,18 +198,25 @@ class Plant:
                 found[i] = float(ca.evalf(self.balanced(i, ca.DM(r), ca.DM(list(loads)), ca.DM(list(values.values())))))
         return found
 
+    @property
+    def measured(self) -> list[int]:
+        """Rows whose states a law measures: the first one, and those that it acts in."""
+        return [k for k, acts in enumerate(self.controlled) if acts or k == 0]
+
     def feels(self, state: str) -> bool:
-        """Whether a state feels a disturbance while the first state is held, by itself or by way of others."""
+        """Whether a state feels a disturbance while all that is measured is held, by itself or by way of others."""
         import casadi as ca
 
-        reached, fresh = set[int](), [self.states.index(state)]
+        known = self.measured
+        reached, fresh = set(known), [k for k in [self.states.index(state)] if k not in known]
         while fresh:
             i = fresh.pop()
             reached.add(i)
-            if i and ca.depends_on(self.force[i], self.w):
+            if ca.depends_on(self.force[i], self.w):
                 return True
-            read = [j for j in range(1, len(self.states)) if ca.depends_on(self.force[i], self.x[j])]
-            fresh += [j for j in read if i and j not in reached]
+            fresh += [
+                j for j in range(len(self.states)) if j not in reached and ca.depends_on(self.force[i], self.x[j])
+            ]
         return False
 
     def readers(self, i: int) -> list[int]:

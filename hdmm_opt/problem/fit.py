@@ -159,10 +159,12 @@ def check_observer(study: Study, machine: Machine, ranges: Mapping[str, Sequence
 
 
 def check_monitor(study: Study, machine: Machine) -> Iterator[InvalidInputError]:
-    """A monitor watches limits of one signal, of plants whose other rows do not read a disturbance."""
+    """A monitor watches limits of one signal, and estimates what no disturbance moves; it needs measured states."""
     monitor = study.controller.monitor
     if monitor is None:
         return
+    if study.controller.observer is not None:
+        yield InvalidInputError("controller.monitor has no place beside controller.observer; remove one")
     for name, plant in zip(machine.members, machine.plants, strict=True):
         known = [limit.name for limit in plant.limits if len(limit.signals) == 1]
         for limit in monitor.limits:
@@ -170,10 +172,10 @@ def check_monitor(study: Study, machine: Machine) -> Iterator[InvalidInputError]
                 yield InvalidInputError(f"controller.monitor.limits.{limit} is unknown; {nearest(limit, known)}")
         for limit in plant.limits:
             signal = limit.signals[0]
-            if limit.name in monitor.limits and signal in plant.states[1:] and plant.feels(signal):
+            if limit.name in monitor.limits and signal in plant.states and plant.feels(signal):
                 yield InvalidInputError(
                     f"controller.monitor.limits.{limit.name}: the {signal} of {name} feels a disturbance, and cannot "
-                    "be estimated from the speed; remove it"
+                    "be estimated from what is measured; remove it"
                 )
 
 

@@ -156,7 +156,7 @@ class Batches:
             )
             discrete["seen"][:] = own[0]
             if part.monitor is not None:  # its estimates have settled
-                discrete["monitor"][: len(own) + 1] = np.vstack([own, own[:1]])
+                discrete["monitor"][: len(own)] = own
             seen = own.copy()
             if part.observer is not None:  # it starts from the first measurement and the reference's speed
                 discrete["observer"][0], seen[1] = own[0] - r[0], r[1]

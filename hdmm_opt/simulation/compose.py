@@ -293,7 +293,7 @@ def _controlled(
     watched = ca.SX(0, 1)
     if part.monitor is not None:
         bad, watched = part.monitor.watched(
-            plant, discrete["monitor"], measured[0], r[0], u, discrete["commanded"], nominal, part.period
+            plant, discrete["monitor"], measured, r[0], u, discrete["commanded"], nominal, part.period
         )
         u = ca.if_else(ca.logic_or(bad, stop), ca.SX.zeros(u.numel()), u)
         watched[-1] = ca.logic_or(bad, stop)

@@ -141,8 +141,7 @@ def monitor_of(problem: Problem, k: int) -> Monitor | None:
     ranges = {
         limit.signals[0]: section.limits[limit.name] for limit in member.plant.limits if limit.name in section.limits
     }
-    noisy = member.bounds.noise[0] > 0 and member.resolution[0] == 0
-    return Monitor(error=section.error, ranges=ranges, noisy=noisy)
+    return Monitor(error=section.error, ranges=ranges)
 
 
 def errors_of(law: Law) -> int:
