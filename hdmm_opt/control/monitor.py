@@ -2,8 +2,8 @@
 
 States that the law does not measure are estimated by the rows of the nominal plant, driven by what is measured and by
 the inputs that were commanded: for a hydraulic drive the flow that goes in and the speed say what the pressure is, as
-fast as the leakage forgets. So a speed that is not what the flow makes shows as a pressure that cannot be: a sensor with
-a bias, one that has frozen while the reference moves, a valve that does not follow.
+fast as the leakage forgets. So a speed that is not what the flow makes shows as a pressure that cannot be: a sensor
+with a bias, one that has frozen while the reference moves, a valve that does not follow.
 
 Not guaranteed: estimates are as good as the nominal numbers; what is proved of a monitor is in `docs/proof.md`.
 """

@@ -1,13 +1,16 @@
 """A hydraulic cylinder behind a valve that meters its oil, with equal areas on both sides.
 
 x' = v,    m v' = A p - friction(v) - F,    (V / 4 B) p' = k y sqrt(p_s - sgn(y) p) - A v - c p,    T y' = u - y
+
+A rod that is driven in speed has no first row. Its law acts from the speed on the valve, and the pressure is a mode
+that in the motion asked for carries F, the inertia of the load and the friction of a rod that moves forwards.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .hydraulics import FRICTION, LINE, RELIEF, VALVES, compliance, friction, valve_flow
+from .hydraulics import FRICTION, LINE, SENSORS, VALVES, Row, friction, line, ordered, spool, valve_flow
 from .parameter import Parameter
 from .plant import Limit, Plant
 from .registry import PlantModel
@@ -29,8 +32,9 @@ def defaults(level: str) -> dict[str, Parameter]:
 
 
 def hydraulic_cylinder(
-    level: str, parameters: Mapping[str, Parameter] | None = None, rated: Mapping[str, Parameter] | None = None
-) -> Plant:
+    level: str, parameters: Mapping[str, Parameter] | None = None, rated: Mapping[str, Parameter] | None = None,
+    *, sensor: str,
+) -> Plant:  # fmt: skip
     """Build the symbolic model.
 
     Args:
@@ -38,9 +42,12 @@ def hydraulic_cylinder(
             valve is to keep, as a share of its rated flow).
         parameters: Replacements for `defaults(level)`.
         rated: Nothing: all numbers are read.
+        sensor: "pressure" where the rod is driven in position and position, speed, pressure and opening are measured,
+            "speed" where it is driven in speed, as with a joystick, and nothing else is measured.
 
     Returns:
-        The plant: states position, speed, pressure, opening of the valve.
+        The plant: states position, speed, pressure, opening of the valve, or speed, opening, pressure; its first state
+        is then a speed.
 
     References:
         Merritt (1967), ch. 6.
@@ -51,22 +58,21 @@ def hydraulic_cylinder(
     import casadi as ca
 
     known = {**defaults(level), **(parameters or {})}
-    x, u, w = ca.SX.sym("x", 4), ca.SX.sym("u"), ca.SX.sym("w")
+    names = ("position", "speed", "pressure", "opening", "u", "w")
+    place, v, pressure, opening, u, w = (ca.SX.sym(name) for name in names)
     p = ca.vertcat(*(ca.SX.sym(name) for name in known))
     q = {name: p[k] for k, name in enumerate(known)}
-    pushed, flow = q["area"] * x[2], valve_flow(x[3], x[2], q)
+    pushed, flow = q["area"] * pressure, valve_flow(opening, pressure, q)
+    rod = Row(place, "m", 1, v), Row(v, "m/s", q["load_mass"], pushed - friction(v, q) - w)
+    rows = ordered(rod, line(pressure, flow, q["area"] * v, q), spool(opening, u, q), sensor=sensor)
     return Plant(
-        name="hydraulic_cylinder", level=level, states=("position", "speed", "pressure", "opening"),
-        state_units=("m", "m/s", "Pa", "1"), inputs=("valve_command",), input_unit="1", disturbances=("load_force",),
-        parameters=known, targets=("reference", 0, 1, 2), controlled=(True, True, True, False), input_map=(2,),
-        x=x, u=u, w=w, p=p, mass=ca.vertcat(1, q["load_mass"], compliance(q), q["valve_lag"]),
-        force=ca.vertcat(
-            x[1], pushed - friction(x[1], q) - w[0], flow - q["area"] * x[1] - q["leakage"] * x[2], u[0] - x[3]
-        ),
-        relief={"pressure": RELIEF}, limits=LIMITS, stroke=(0.0, 0.8), carried="load_mass",
-        outputs={"rod_force": pushed, "flow": flow, "power": pushed * x[1]},
+        name="hydraulic_cylinder", level=level, inputs=("valve_command",), input_unit="1",
+        disturbances=("load_force",), parameters=known, u=u, w=w, p=p, **rows, limits=LIMITS,
+        carried="load_mass", first="speed" if sensor == "speed" else "position",
+        stroke=(-0.4, 0.4) if sensor == "speed" else (0.0, 0.8),
+        outputs={"rod_force": pushed, "flow": flow, "power": pushed * v},
         output_units={"rod_force": "N", "flow": "m^3/s", "power": "W"},
     )  # fmt: skip
 
 
-PLANT = PlantModel(levels=tuple(VALVES), defaults=defaults, build=hydraulic_cylinder)
+PLANT = PlantModel(levels=tuple(VALVES), defaults=defaults, build=hydraulic_cylinder, sensors=SENSORS)

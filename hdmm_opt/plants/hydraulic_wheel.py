@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .hydraulics import FRICTION, LINE, POWER, RELIEF, VALVES, compliance, friction, valve_flow
+from .hydraulics import FRICTION, LINE, POWER, SENSORS, VALVES, Row, friction, line, ordered, spool, valve_flow
 from .parameter import Parameter
 from .plant import Limit, Plant
 from .registry import PlantModel
@@ -85,25 +85,17 @@ def hydraulic_wheel(
     import casadi as ca
 
     known = {**defaults(level), **(parameters or {})}
-    chain = sensor == "pressure"
-    v, pressure, opening = (ca.SX.sym(name) for name in ("speed", "pressure", "opening"))
-    u, w = ca.SX.sym("u"), ca.SX.sym("w", 2)
+    v, pressure, opening, u = (ca.SX.sym(name) for name in ("speed", "pressure", "opening", "u"))
+    w = ca.SX.sym("w", 2)
     p = ca.vertcat(*(ca.SX.sym(name) for name in known))
     q = {name: p[k] for k, name in enumerate(known)}
     pushed, flow = drive_force(v, pressure, q), valve_flow(opening, pressure, q)
-    rim = (v, "m/s", "reference", q["wheel_mass"], pushed - friction(v, q) - w[0] - w[1])
-    spent = area(q) * v + q["leakage"] * pressure
-    line = (pressure, "Pa", 0 if chain else "balance", compliance(q), flow - spent)
-    spool = (opening, "1", 1 if chain else 0, q["valve_lag"], u - opening)
-    rows: list[Any] = [rim, line, spool] if chain else [rim, spool, line]
-    x, units, targets, mass, force = ([row[k] for row in rows] for k in range(5))
+    rim = Row(v, "m/s", q["wheel_mass"], pushed - friction(v, q) - w[0] - w[1])
+    rows = ordered([rim], line(pressure, flow, area(q) * v, q), spool(opening, u, q), sensor=sensor)
     return Plant(
-        name="hydraulic_wheel", level=level, states=tuple(state.name() for state in x), state_units=tuple(units),
-        inputs=("valve_command",), input_unit="1", disturbances=("traction", "roughness"), parameters=known,
-        targets=tuple(targets), controlled=(True, chain, False), input_map=(1 if chain else 0,), x=ca.vertcat(*x), u=u,
-        w=w, p=p, mass=ca.vertcat(*mass), force=ca.vertcat(*force),
-        limits=LIMITS, stroke=(-1.0, 1.0), first="speed", carried="wheel_mass", leads=0 if chain else 2,
-        relief={"pressure": RELIEF},
+        name="hydraulic_wheel", level=level, inputs=("valve_command",), input_unit="1",
+        disturbances=("traction", "roughness"), parameters=known, u=u, w=w, p=p, **rows,
+        limits=LIMITS, stroke=(-1.0, 1.0), first="speed", carried="wheel_mass",
         outputs={
             "wheel_torque": q["wheel_radius"] * pushed, "line_pressure": pressure, "flow": flow, "power": pushed * v
         },
@@ -111,4 +103,4 @@ def hydraulic_wheel(
     )  # fmt: skip
 
 
-PLANT = PlantModel(levels=tuple(VALVES), defaults=defaults, build=hydraulic_wheel, sensors=("speed", "pressure"))
+PLANT = PlantModel(levels=tuple(VALVES), defaults=defaults, build=hydraulic_wheel, sensors=SENSORS)

@@ -11,11 +11,13 @@ valve with a pressure compensator keeps the flow that it is told instead, Q = q 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 from .parameter import Parameter
 
+#: What may be measured of a drive beside its first state: its speed alone, or pressure and opening too.
+SENSORS = ("speed", "pressure")
 #: Over which the flow turns round, a direction of a force shows, and friction builds up: sharp, and without a kink.
 OPENING, POWER, SPEED = 0.02, 5.0, 0.005
 COMPENSATED = {
@@ -82,3 +84,48 @@ def friction(v: Any, q: Mapping[str, Any]) -> Any:
     # constant times what may change: a proof knows of a constant that it is one
     side, more = ca.tanh(v / SPEED), 1 + (v / q["stribeck_speed"]) ** 2
     return q["viscous_friction"] * v + q["coulomb_friction"] * side + q["stribeck_friction"] * (side / more)
+
+
+class Row(NamedTuple):
+    """A state of a plant: its symbol and unit, and M and h of M x' = h."""
+
+    state: Any
+    unit: str
+    mass: Any
+    force: Any
+
+
+def line(pressure: Any, flow: Any, displaced: Any, q: Mapping[str, Any]) -> Row:
+    """The pressure of the line, from the oil that comes in and what the motion takes, m³/s."""
+    return Row(pressure, "Pa", compliance(q), flow - (displaced + q["leakage"] * pressure))
+
+
+def spool(opening: Any, u: Any, q: Mapping[str, Any]) -> Row:
+    """The opening of the valve, which follows what is commanded."""
+    return Row(opening, "1", q["valve_lag"], u - opening)
+
+
+def ordered(moved: Sequence[Row], pressure: Row, opening: Row, *, sensor: str) -> dict[str, Any]:
+    """States of a drive in the order in which a law goes through them, and its relief valves, as fields of a plant.
+
+    Args:
+        moved: What the oil moves, from its first state to the speed that the pressure acts on.
+        pressure: `line`.
+        opening: `spool`.
+        sensor: "pressure": every state is tracked by the one after it. "speed": the law goes from the speed, the last
+            row of `moved`, to the valve with two leads, and the pressure is a mode that carries what the motion needs.
+    """
+    import casadi as ca
+
+    chain = sensor == "pressure"
+    rows = [*moved, pressure, opening] if chain else [moved[-1], opening, pressure]
+    states, units, masses, forces = zip(*rows, strict=True)
+    n = len(rows)
+    return {
+        "states": tuple(state.name() for state in states), "state_units": units,
+        "x": ca.vertcat(*states), "mass": ca.vertcat(*masses), "force": ca.vertcat(*forces),
+        "targets": ("reference", *range(n - 1)) if chain else ("reference", 0, "balance"),
+        "controlled": (*[True] * (n - 1), False) if chain else (True, False, False),
+        "input_map": (n - 2 if chain else 0,), "leads": 0 if chain else 2,
+        "relief": {pressure.state.name(): RELIEF},
+    }  # fmt: skip

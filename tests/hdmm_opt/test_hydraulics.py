@@ -19,7 +19,7 @@ from hdmm_opt.jobs.compare import compare
 from hdmm_opt.jobs.options import Options, Progress
 from hdmm_opt.jobs.pipeline import design
 from hdmm_opt.plants.hydraulic_wheel import area, defaults, drive_force, hydraulic_wheel
-from hdmm_opt.plants.hydraulics import compliance, friction, valve_flow
+from hdmm_opt.plants.hydraulics import SENSORS, compliance, friction, valve_flow
 from hdmm_opt.plants.registry import plant_model
 from hdmm_opt.plants.sound import check_plant
 from hdmm_opt.problem import assemble
@@ -109,8 +109,8 @@ def by_hand(name, x, u, w, q):
                 stiff * (q["flow_gain"] * u - q["area"] * v - q["leakage"] * p)]  # fmt: skip
     stiff = 4 * q["bulk_modulus"] / q["line_volume"]
     if name == "hydraulic_cylinder":
-        _, v, p, y = x
-        return [v, (q["area"] * p - rubbing(v) - w[0]) / q["load_mass"],
+        *place, v, p, y = x
+        return [*(v for _ in place), (q["area"] * p - rubbing(v) - w[0]) / q["load_mass"],
                 stiff * (oil(y, p) - q["area"] * v - q["leakage"] * p), (u - y) / q["valve_lag"]]  # fmt: skip
     v, p, y = x
     a, eta = q["reduction"] * q["displacement"] / q["wheel_radius"], q["efficiency"]
@@ -122,8 +122,9 @@ def by_hand(name, x, u, w, q):
 @pytest.mark.parametrize(
     ("model", "level", "sensor"),
     [("hydraulic_wheel", "valve", "pressure"), ("hydraulic_wheel", "flow", "pressure"),
-     ("hydraulic_wheel", "flow", "speed"), ("hydraulic_cylinder", "valve", None),
-     ("hydraulic_cylinder", "flow", None), ("pneumatic_cylinder", "valve", None)],
+     ("hydraulic_wheel", "flow", "speed"), ("hydraulic_cylinder", "valve", "pressure"),
+     ("hydraulic_cylinder", "flow", "pressure"), ("hydraulic_cylinder", "valve", "speed"),
+     ("hydraulic_cylinder", "flow", "speed"), ("pneumatic_cylinder", "valve", None)],
 )  # fmt: skip
 def test_rates_are_those_of_the_equations(model, level, sensor):
     kind, random = plant_model(model), np.random.default_rng(7)
@@ -139,6 +140,25 @@ def test_rates_are_those_of_the_equations(model, level, sensor):
         order = [s for s in ("position", "speed", "pressure", "opening") if s in plant.states]
         wanted = dict(zip(order, by_hand(model, [at[s] for s in order], u, w, plant.values()), strict=True))
         assert made == pytest.approx([wanted[s] for s in plant.states], rel=1e-9)
+
+
+@pytest.mark.parametrize("level", ["valve", "flow"])
+@pytest.mark.parametrize("model", ["hydraulic_wheel", "hydraulic_cylinder"])
+def test_a_drive_is_one_model_whatever_is_measured(model, level):
+    """A law in speed and one in what is measured beside it: the same rates of the same states, the same outputs."""
+    forms, random = [plant_model(model).build(level, {}, {}, sensor=s) for s in SENSORS], np.random.default_rng(11)
+    assert forms[0].first == "speed" and forms[0].states == ("speed", "opening", "pressure")
+    assert set(forms[0].states) <= set(forms[1].states) and forms[0].parameters == forms[1].parameters
+    for _ in range(50):
+        at = {"position": random.uniform(0, 0.8), "speed": random.uniform(-0.3, 0.3), "opening": random.uniform(-1, 1),
+              "pressure": random.uniform(-1e7, 1e7)}  # fmt: skip
+        u, w, found = random.uniform(-1, 1), random.uniform(-5e3, 5e3, forms[0].w.numel()), []
+        for plant in forms:
+            shown = ca.vertcat(plant.rate, *plant.outputs.values())
+            values = ca.Function("rate", [plant.x, plant.u, plant.w, plant.p], [shown])(
+                [at[s] for s in plant.states], u, w, list(plant.values().values()))  # fmt: skip
+            found.append(dict(zip((*plant.states, *plant.outputs), np.array(values).ravel(), strict=True)))
+        assert found[0] == {name: found[1][name] for name in found[0]}
 
 
 def wheel(sensor="speed", level="flow", **parameters):
@@ -250,6 +270,33 @@ def test_a_wheel_goes_through_a_file():
     assert told.status == 0 and "mm/s" in told.message
 
 
+def test_a_rod_that_is_driven_in_speed_is_proved():
+    """By a speed sensor alone, against a load; the checker decides it, and refuses a slower valve. Runs stay inside."""
+    problem = assemble(study_from(bundled("cylinder")))
+    (member,) = problem.members
+    values = gains_of(problem, beta_1=0.52, gamma_1=68.0, lead_1=0.02)
+    found = certificate(member, values)
+    assert not isinstance(found, Failure), found.reason
+    assert 0.005 < found.ultimate[0] < 0.012  # the reference is 0.05 m/s at least
+    claim = claim_of(member.model, member.bounds, member.gains(values), found, limit=1e30, accuracy=1e30)
+    claim = replace(claim, first="speed")
+    assert verdict(claim)
+    slower = {**claim.parameters, "valve_lag": tuple(v * Fraction(12, 10) for v in claim.parameters["valve_lag"])}
+    assert not verdict(replace(claim, parameters=slower))
+    q, runs = member.plant.values(), []
+    hertz = q["area"] * math.sqrt(1 / (compliance(q) * q["load_mass"])) / (2 * math.pi)
+    assert hertz == pytest.approx(33.4, abs=0.1)
+    half = 1 / (2 * hertz)
+    for width in (half, 0.7 * half, 1.4 * half):
+        course = tuple((1.0 + width * k, 5000.0 + 1e4 * width * (-1) ** k) for k in range(120))
+        for share in (-1.0, 1.0):
+            parameters = dict.fromkeys(("load_mass", "bulk_modulus", "leakage"), share) | {"valve_lag": -share}
+            runs.append(Run(gains={member.name: values}, scenario=Scenario(
+                name="s", disturbances={"load_force": course}, noise=1.0, initial=1.0, parameters=parameters)))  # fmt: skip
+    errors = [figures.maximum_error_m for figures in Loop(problem).figures(runs)]
+    assert 0.1 * found.ultimate[0] < max(errors) <= found.ultimate[0]
+
+
 def test_the_air_of_two_chambers_is_a_spring():
     """Both chambers balanced by hand, p_i V_i^n constant: the force that a small travel makes."""
     plant = plant_model("pneumatic_cylinder").build("valve", {}, {})
@@ -264,8 +311,8 @@ def test_the_air_of_two_chambers_is_a_spring():
 
 
 def test_rivals_of_force_are_not_made_for_a_valve():
-    for model in ("hydraulic_cylinder", "pneumatic_cylinder"):
-        plant = plant_model(model).build("valve", {}, {})
+    for model, form in (("hydraulic_cylinder", {"sensor": "pressure"}), ("pneumatic_cylinder", {})):
+        plant = plant_model(model).build("valve", {}, {}, **form)
         for kind in rivals().values():
             with pytest.raises(ValueError, match="it needs a"):
                 kind(plant=plant)
