@@ -93,6 +93,7 @@ def _sentence(document: Mapping[str, Any], problem: Problem, verdict: checker.Re
     if verdict.status:
         return verdict.message
     alone = "the rod" if problem.study.plant.model == "pmsm_emla" else "the output"
+    alone = "every member" if len(problem.members) > 1 else alone
     what = alone if problem.loads is None else "the tool"
     bound = f"{upward(1e3 * certified_of(document))} m{problem.machine.output_unit}"
     shown = document["validation"]
@@ -128,7 +129,7 @@ def _bars(problem: Problem, made: Pictures, verdict: checker.Report | None) -> l
     for member in problem.members:
         prefix = f"{member.name} " if len(problem.members) > 1 else ""
         low, high = member.plant.stroke
-        sizes = {limit.name: f"{limit.value:.4g} {limit.unit}" for limit in member.plant.limits}
+        sizes = {limit.name: f"{limit.value:.4g} {limit.unit}".removesuffix(" 1") for limit in member.plant.limits}
         sizes["stroke"] = f"{low:.4g} to {high:.4g} {member.plant.state_units[0]}"
         for name, size in sizes.items():
             share, seen = certified.get((member.name, name)), simulated.get((member.name, name), 0.0)

@@ -18,6 +18,8 @@ PLAIN = {
     "loads": "what the members do to each other is inside what each was proved under",
     "coupling": "together the members have one well-defined motion",
     "output": "the error of the tool is inside what the study requires",
+    "supply": "there is enough for all members of what they draw on together",
+    "monitor": "nothing is shut down while all assumptions hold, as far as what is watched is measured",
 }
 
 

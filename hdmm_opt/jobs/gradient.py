@@ -70,8 +70,9 @@ def derivatives(loop: Loop, point: Array, wanted: bool) -> Derivatives:
     cost = certified + simulated_cost(problem, shown)
     if not wanted:
         return Derivatives(cost=cost, gradient=nothing.gradient, slacks=room, jacobian=nothing.jacobian, evaluations=1)
-    # neither an encoder's rounding nor a fault has a useful derivative: the slope is that of the loop without them
-    smooth = [replace(run, scenario=replace(run.scenario, quantisation=0.0, faults={})) for run in runs]
+    # neither an encoder's rounding nor a fault has a useful derivative, and a body's loads are not differentiated: the
+    # slope is that of the loop without them
+    smooth = [replace(run, scenario=replace(run.scenario, quantisation=0.0, faults={}, ground=None)) for run in runs]
     _, rms, itae = loop.sensitivities(smooth, _directions(problem, gains))
     scales = cost_scales(problem)
     gradient = (scales[0] * rms + scales[1] * itae).sum(axis=0) / max(len(runs), 1)

@@ -160,11 +160,12 @@ class Loop:
             each run and direction. Not guaranteed: at a kink the derivative is that of one side.
 
         Raises:
-            ValueError: a scenario with a fault or with quantisation, which has no useful derivative.
+            ValueError: a scenario with a fault, with quantisation or over ground, which is not differentiated.
         """
-        if any(run.scenario.quantisation or run.scenario.faults for run in runs):
+        if any(run.scenario.quantisation or run.scenario.faults or run.scenario.ground is not None for run in runs):
             raise ValueError(
-                "a loop is differentiated without faults and without quantisation: got a scenario with them"
+                "a loop is differentiated without faults, without quantisation and without ground: got a scenario with "
+                "them"
             )
         if "derivative" not in self._engines:
             self._engines["derivative"] = Engine(differentiated(self.system()), compiled=self.compiled)
