@@ -22,6 +22,10 @@ def resolved(problem: Problem) -> dict[str, Any]:
     for key in STROKE.values():
         plant.pop(key, None)
     plant.pop("damping", None)  # it is a parameter of every joint
+    for scenario in data["validation"]["scenarios"]:
+        for fault in scenario["faults"].values():
+            if fault["kind"] == "actuator":  # which has no size
+                del fault["kind"], fault["size"]
     body = problem.machine.body
     plant.pop("body")
     plant.pop("shared")
